@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup extras demo test test-all fuzz package bench bench-gpu figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures report release site validation measured energy realtime lint clean help
+.PHONY: setup extras demo test test-all fuzz package bench bench-gpu figures gallery evaluation methods sweeps tradeoff plan parameters notebooks blender blender-figures release site validation measured energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -116,10 +116,6 @@ site: setup  ## build the pages with an API reference: out/site/index.html
 	@PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(PYTHON3) -W ignore -m mkdocs build --strict --quiet
 	@echo "Open out/site/index.html"
 
-report: setup  ## collect the figures that README claims, with their commands: out/report.html
-	@mkdir -p out
-	@$(PYTHON3) -m docs.make.report -o out/report.html
-
 release: setup  ## check and build a release into out/release; TESTS=1 tests the wheel, too
 	@.ci/release
 
@@ -139,18 +135,18 @@ energy: setup  ## measure what energy conservation takes: docs/energy.md
 	@$(PYTHON3) -m docs.make.figures.tables energy $(SURFACES:%=out/energy/%.json)
 
 # scene, width, height, samples of the path tracer, frames, samples a frame along either side of a pixel
-REALTIME := scales:36:24:16200:2048:2 snake:40:25:97200:3072:5 xenopeltis:32:20:96100:3072:3 \
-    cd:36:26:48400:1024:3 grating:36:28:48400:1024:3 hologram:36:26:48400:1024:3 material_ball:30:27:48400:3072:3
+REALTIME := scales:36:24:16200:1024:2 snake:40:25:48600:768:5 xenopeltis:32:20:48400:1536:3 \
+    cd:36:26:24200:1024:3 grating:36:28:24200:1024:3 hologram:36:26:24200:2048:3 material_ball:30:27:24200:1536:3
 # whether what a comparison wrote is no older than the code and the scenes
 UP_TO_DATE = [ -e $(1) ] && [ -z "$$(find mitsuba_diffraction scenes precompute/*.toml Makefile -newer $(1) -type f ! -name '*.pyc' -print -quit)" ]
 realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	@for scene in $(REALTIME); do \
 	    set -- $$(echo $$scene | tr : ' '); made=out/compare/$$1; \
 	    if $(call UP_TO_DATE,$$made/compare.json); then echo "$$made is kept: no code or scene is newer"; \
-	    else $(RUN) compare scenes/$$1.xml --method fast exact -s $$4 --frames $$5 --supersampling $$6 \
+	    else $(RUN) compare scenes/$$1.xml --method fast exact -s $$4 --frames $$5 --supersampling $$6 --full-spp 0 \
 	        -D resx=$$2 -D resy=$$3 -o $$made; fi || exit 1; done
-	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method fast -s 1024 --full-spp 256 \
-	    --frames 512 --supersampling 2 -D resx=320 -D resy=200 -o out/compare/sheet
+	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method fast -s 512 --full-spp 128 \
+	    --frames 256 --supersampling 2 -D resx=320 -D resy=200 -o out/compare/sheet
 	@$(PYTHON3) -m docs.make.figures.realtime --sheet out/compare/sheet $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
 
 lint: setup  ## check style, types and the layers of imports

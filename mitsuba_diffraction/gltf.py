@@ -28,7 +28,7 @@ _NUMBERS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, 
 
 
 @dataclass(frozen=True)
-class Material:
+class GltfMaterial:
     """Material of a glTF file.
 
     Attributes
@@ -47,7 +47,7 @@ class Material:
 
 #: Name of what has no material.
 NO_MATERIAL = "none"
-#: What a `Material` holds, in the document's words.
+#: What a `GltfMaterial` holds, in the document's words.
 _HELD = ("name", "pbrMetallicRoughness", "baseColorFactor", "baseColorTexture", "metallicFactor",
          "roughnessFactor", "doubleSided", "extras", "alphaCutoff", "alphaMode")  # fmt: skip
 
@@ -102,15 +102,19 @@ def note_named(file: Path) -> None:
                 note_input(file.parent / unquote(name))
 
 
-def materials_of(file: Path) -> list[Material]:
-    """Return the materials of a glTF file, and `NO_MATERIAL` if there are triangles without.
+def materials_of(file: Path) -> list[GltfMaterial]:
+    """Return the materials of a glTF file's meshes, and `NO_MATERIAL` if there are some without.
 
     Raises a DiffractionError if the file is damaged.
     """
     try:
         document, _ = _parts(file)
-        found = []
-        for number, given in enumerate(document.get("materials", ())):
+        primitives = [p for mesh in document.get("meshes", ()) for p in mesh.get("primitives", ())]
+        used = {primitive.get("material") for primitive in primitives}
+        found, all_materials = [], document.get("materials", [])
+        for number, given in enumerate(all_materials):
+            if number not in used:
+                continue
             surface = given.get("pbrMetallicRoughness", {})
             extensions = given.get("extensions", {})
             present = [*given, *surface, *extensions]
@@ -120,10 +124,9 @@ def materials_of(file: Path) -> list[Material]:
                 float(surface.get(f"{name}Factor", 1.0)) for name in ("metallic", "roughness")
             )
             name = str(given.get("name") or f"material {number}")
-            found.append(Material(number, name, metal, rough, tuple(left)))
-        primitives = [p for mesh in document.get("meshes", ()) for p in mesh.get("primitives", ())]
-        if any("material" not in primitive for primitive in primitives):
-            found.append(Material(len(found), NO_MATERIAL, 0.0, 1.0, ()))
+            found.append(GltfMaterial(number, name, metal, rough, tuple(left)))
+        if None in used:
+            found.append(GltfMaterial(len(all_materials), NO_MATERIAL, 0.0, 1.0, ()))
     except (ValueError, LookupError, TypeError, AttributeError) as error:
         raise DiffractionError(
             f"'{file}' cannot be read as glTF: {one_line(str(error))}"

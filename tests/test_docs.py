@@ -102,7 +102,9 @@ def test_every_option_in_a_sentence_is_one_of_some_command():
     own = {
         option
         for path in (ROOT / "docs" / "make").rglob("*.py")
-        for option in re.findall(r'add_argument\([^)]*?"(--[\w-]+)"', path.read_text("utf-8"))
+        for option in re.findall(
+            r'(?:argument|option)\([^)]*?"(--[\w-]+)"', path.read_text("utf-8")
+        )
     }
     for page in PAGES:
         for span in spans(page):

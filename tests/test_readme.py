@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+from tests.support.pages import PAGES
+
+README = PAGES["README.md"]
 
 
 def block(language: str) -> str:
@@ -43,6 +46,28 @@ def test_xml_example_loads():
     Path("scene.xml").write_text(f'<scene version="3.0.0">{block("xml")}</scene>', encoding="utf-8")
     scene = mi.load_file("scene.xml")
     assert "Diffraction" in str(scene.shapes()[0].bsdf())
+
+
+@pytest.mark.parametrize(
+    ("stated", "page", "measured"),
+    [
+        (f"less than 5 % in the mean up to an RMS slope of {GENTLE_SLOPE:g}", "validation",
+         ("less than 5 %", f"{GENTLE_SLOPE:g}")),
+        (f"less than 20 % up to {STEEP_SLOPE:g}", "validation",
+         ("less than 20 %", f"{STEEP_SLOPE:g}")),
+        ("7.3 %", "validation", ("keratin, cuts of scales, slope 0.2 ", "| 7.3 %,")),
+        ("22 to 73 % in the mean", "validation",
+         ("keratin, walls, depth/period above 0.08 ", "| 22 %")),
+        ("22 to 73 % in the mean", "validation",
+         ("aluminium, walls, depth/period above 0.08 ", "| 73 %,")),
+        ("0.8 %", "orders", ("within 0.8 %",)),
+    ],
+)  # fmt: skip
+def test_its_figures_are_on_the_page_that_measures_them(stated, page, measured):
+    assert stated in " ".join(README.split())
+    text = PAGES[f"docs/{page}.md"]
+    found = [*text.splitlines(), *(" ".join(block.split()) for block in text.split("\n\n"))]
+    assert any(all(words in line for words in measured) for line in found)
 
 
 def test_it_has_at_most_200_lines():

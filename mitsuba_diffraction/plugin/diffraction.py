@@ -90,8 +90,8 @@ film_ior : float or string [none]
     Index of a thin film that follows the heights and interferes, as an oxide. Relative index: the
     differentiable `film_eta`. Excludes a coat.
 film_thickness : float or texture ∂ [none]
-    Along the vertical, nm; 2 n d is at most 12 µm. Or a picture's name, raw texture or mesh
-    attribute, 0 to 1.
+    Along the vertical, nm; 2 n d is at most 12 µm. Or a picture, raw texture or mesh attribute,
+    0 to 1.
 film_thickness_min, film_thickness_max : float [0, none]
     Thicknesses, nm, where a texture of film_thickness is 0 and 1.
 film_k : float ∂ [0]
@@ -143,10 +143,12 @@ coherence width. Reflections between face and structure are summed. Light beyond
 is lost (docs/validation.md). Renderings use water's index at 589 nm for paths: orders at 400 nm are
 up to 4 % too dark. `spectrum` uses n(λ).
 
-**Films and stacks.** RGB variants sum the film's colours over wavelengths, apart from the orders. A
-stack's `spread` is the standard deviation of all thicknesses from place to place, as a share:
-`layers = [["chitin", 0.09], ["1.33", 0.08]]`. Stacks exclude a nested BSDF if they absorb. Under a
-spread, polarised variants keep the mean phase between s and p.
+**Films and stacks.** Scales of energy under a texture of thicknesses from 100 to 600 nm take a
+minute, once; beyond 82° single thicknesses send on up to 1.06 of the light. RGB variants sum the
+film's colours over wavelengths, apart from the orders. A stack's `spread` is the standard deviation
+of all thicknesses from place to place, as a share: `layers = [["chitin", 0.09], ["1.33", 0.08]]`.
+Stacks exclude a nested BSDF if they absorb. Under a spread, polarised variants keep the mean phase
+between s and p.
 
 **Energy.** Dielectrics are unaffected; metal gratings lose some per cent in directions without gain
 (docs/energy.md). The scale costs seconds once and is cached. It is interpolated over height_scale.

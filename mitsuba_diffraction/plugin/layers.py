@@ -58,7 +58,8 @@ THICKNESS_STEP = 1.0
 #: The same while derivatives by the thickness are taken: each step costs seconds.
 OPTIMISED_STEP = 5.0
 #: Thicknesses, in a fringe of the shortest wavelength, between which scales of energy are linear.
-FRINGE = 6
+#: Light that a film on silver guides at 86° is sent on 1.06 times in between; with 6, 1.5 times.
+FRINGE = 16
 #: Power that comes back of light that would see the material alone, below which nobody sees it.
 LEAST_THROUGH = 1e-6
 

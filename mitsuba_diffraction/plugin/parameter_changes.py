@@ -84,7 +84,7 @@ class Bounded:
         callback.put(self._name, self.value, mi.ParamFlags.Differentiable)
 
 
-class Heights:
+class GivenHeights:
     """Heights given as `data`: another table is made where they change.
 
     Derivatives by heights are of `md.design`: a table has none.

@@ -20,7 +20,7 @@ from ..settings import SURFACE, checked
 from ..tables.source import TableSource, loaded_table
 from ..tables.table import DiffractionTable
 from .dictionary import Data
-from .parameter_changes import Heights
+from .parameter_changes import GivenHeights
 from .parameters import READING, SOURCES, TABLE, coherence_of, resolved_path
 from .types import Properties
 
@@ -37,7 +37,7 @@ class Patch(NamedTuple):
 
     table: DiffractionTable
     heights: Callable[[], HeightField]
-    given: Heights | None = None
+    given: GivenHeights | None = None
 
 
 def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
@@ -73,7 +73,7 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
             given = replace(field, heights=heights)
             return _built(TableSource.of(treat(given, options)), asked, height_scale, stretch)
 
-        return patch_of(field.heights)._replace(given=Heights("data", field.heights, patch_of))
+        return patch_of(field.heights)._replace(given=GivenHeights("data", field.heights, patch_of))
     if not isinstance(value, str):
         raise DiffractionError(f"{name}={value!r} must be the name of a file")
     source = TableSource.of(resolved_path(value, name), options)

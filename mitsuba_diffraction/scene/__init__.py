@@ -15,6 +15,7 @@ additions    meshes, lights and filters changed before Mitsuba makes a scene's o
 surfaces     surfaces and their parameters put into a scene
 clamping     integrator that limits the light of single samples
 bands        films with a band for each receptor of an eye, and tables that cover it
+mesh_materials  materials of glTF files, each a shape
 fitted_mesh  mesh files put on a stage: upright, centred, standing on the floor
 hologram     textures of dot-matrix holograms from pictures
 logo         areas of colour of a picture, and the gratings that show them

@@ -88,7 +88,10 @@ def fit_meshes(state: Any, folder: Path) -> None:
         part = [int(each) for each in props.get(PART, "").split(",") if each]
         ply = copied(props, "ply", leave=_OF_FILE)
         if part:
-            mesh = mesh.part(np.isin(materials, part))
+            if not (chosen := np.isin(materials, part)).any():
+                raise DiffractionError(f"mesh '{file}': its scene has no triangles of the material "
+                                       f"'{props.id()}'; delete that material")  # fmt: skip
+            mesh = mesh.part(chosen)
         if OWN in props:
             ply["bsdf"] = own_bsdf(file, part[0])
         write_ply(written, mesh)

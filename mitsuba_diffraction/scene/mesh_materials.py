@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from ..errors import check_choice, warn
 from ..files import GLTF, readable_file
-from ..gltf import Material, materials_of
+from ..gltf import GltfMaterial, materials_of
 from ..plugin.pigment import base_colour
 from .surfaces import copied, targets_of
 
@@ -52,18 +52,20 @@ def split_meshes(state: Any, wanted: Collection[str], fitted: str) -> list[str]:
         if others == OTHERS[0]:
             parts = {name: parts[name] for name in parts if name in ids}
             parts |= {props.id(): rest} if rest else {}
-        for name, part in parts.items():
-            _put_part(state, number, name, part, others == OTHERS[1] and name not in ids)
-        _remove(state, number)
+        made = [
+            _part(state, number, name, part, others == OTHERS[1] and name not in ids)
+            for name, part in parts.items()
+        ]
+        _put_shapes(state, number, made)
     return known
 
 
-def _put_part(state: Any, number: int, name: str, part: list[Material], own: bool) -> None:
-    """Add a shape of some materials of a file to the scene.
+def _part(state: Any, number: int, name: str, part: list[GltfMaterial], own: bool) -> Any:
+    """Return the properties of a shape of some materials of another shape's file.
 
     own : whether it has the file's material in place of the surface of the whole.
     """
-    node, whole = mi.parser.SceneNode(), state.nodes[number]
+    whole = state.nodes[number]
     targets = targets_of(whole, state.id_to_index)
     surfaces = [n for n, to in targets.items() if state.nodes[to].type == mi.ObjectType.BSDF]
     copy = copied(whole.props, whole.props.plugin_name(), leave=surfaces if own else ())
@@ -71,19 +73,20 @@ def _put_part(state: Any, number: int, name: str, part: list[Material], own: boo
         copy[OWN] = True
     copy[PART] = ",".join(str(material.number) for material in part)
     copy.set_id(name)
-    node.type, node.props = mi.ObjectType.Shape, copy
-    state.nodes.append(node)
-    last = len(state.nodes) - 1
-    state.id_to_index = {**state.id_to_index, name: last}
-    state.nodes[0].props[f"part_{last}"] = mi.Properties.ResolvedReference(last)
+    return copy
 
 
-def _remove(state: Any, number: int) -> None:
-    """Remove a shape from the scene."""
-    scene = state.nodes[0]
-    for name, target in targets_of(scene).items():
-        if target == number:
-            del scene.props[name]
+def _put_shapes(state: Any, number: int, made: list[Any]) -> None:
+    """Put several shapes in place of one."""
+    ids = {name: n for name, n in state.id_to_index.items() if n != number}
+    state.nodes[number].props, ids[made[0].id()] = made[0], number
+    for props in made[1:]:
+        node, last = mi.parser.SceneNode(), len(state.nodes)
+        node.type, node.props = mi.ObjectType.Shape, props
+        state.nodes.append(node)
+        state.nodes[0].props[f"part_{last}"] = mi.Properties.ResolvedReference(last)
+        ids[props.id()] = last
+    state.id_to_index = ids
 
 
 def own_bsdf(file: Path, number: int) -> Any:
@@ -92,7 +95,7 @@ def own_bsdf(file: Path, number: int) -> Any:
     The textures of metallic and roughness (glTF 2.0, 3.9.2), and all else, are left out with a
     warning.
     """
-    material = materials_of(file)[number]
+    material = next(each for each in materials_of(file) if each.number == number)
     if material.left_out:
         warn(
             f"material {material.name!r} of '{file}' is shown without its "

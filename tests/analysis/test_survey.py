@@ -22,7 +22,6 @@ from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
-from mitsuba_diffraction.tables.store import VARIABLE
 from mitsuba_diffraction.tables.table import DiffractionTable
 from tests.support.directions import rough_patch
 
@@ -50,14 +49,9 @@ def survey(scans, tmp_path):
     options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
 
     def call(files=scans, **more):
+        out = tmp_path / "out"
         return run_survey(
-            files,
-            tmp_path / "out",
-            treatments=options,
-            common=own,
-            resolution=32,
-            theta=20.0,
-            **more,
+            files, out, treatments=options, common=own, resolution=32, theta=20.0, **more
         )
 
     return call
@@ -99,26 +93,6 @@ def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path)
     assert "starts at 500 nm" in row["reason"]
 
 
-def test_a_survey_and_a_spectrum_of_a_scan_share_its_table(run, scans, tmp_path, monkeypatch):
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
-    how = ("--pixel-size", PIXEL, "--coherence-width", 6, "--tolerance", 0.05)
-    assert run("survey", scans[0], "-o", tmp_path / "out", "--resolution", 8, *how).code == 0
-    (table,) = (tmp_path / "cache").glob("table-*")
-    ran = run(
-        "spectrum",
-        scans[0],
-        "-o",
-        tmp_path / "light.csv",
-        "--step",
-        200,
-        "--wavelength-range",
-        "400:700",
-        *how,
-    )
-    assert ran.code == 0, ran.err
-    assert list((tmp_path / "cache").glob("table-*")) == [table]
-
-
 def test_a_second_run_does_only_what_is_new(survey, scans, monkeypatch):
     first = survey()
     measured = []
@@ -145,22 +119,6 @@ def test_the_command_writes_the_folder(run, scans, tmp_path):
     assert "1 scans in survey.csv, 2 failed, 3 samples" in ran.out
     assert "none.npy" in ran.err
     assert "uncertain by some 15 %" in ran.err
-
-
-@pytest.mark.parametrize(
-    "options",
-    [
-        ("--material", "kerratin"),
-        ("--ext-ior", "melanin"),
-        ("--pigment", "blueish"),
-        ("--pigment", "0.2", "--material", "gold"),
-    ],
-)
-def test_materials_that_are_none_are_refused_before_a_scan_is_measured(
-    run, scans, tmp_path, options
-):
-    line = run("survey", *scans, "-o", tmp_path / "out", *options).failed_in_one_line()
-    assert options[-1] in line
 
 
 def test_treatments_are_those_of_all_patterns_that_match(tmp_path):

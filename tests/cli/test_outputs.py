@@ -42,6 +42,7 @@ def _contents(folder: Path) -> dict[str, tuple[int, bytes]]:
         f"export-shader h.npy {HEIGHTS} -o folder",
         f"export-osl h.npy {HEIGHTS} -o folder --name a",
         "export-viewer scale.xml -o page.html -m scalar_rgb", "compare scale.xml -o folder",
+        "view scale.xml -o page.html -m scalar_rgb",
         "hologram logo.png -o folder", f"survey h.npy {HEIGHTS} -o folder",
         f"sweep method h.npy {HEIGHTS} -o h.png", "tradeoff h.npy --pixel-size 0.1 -o folder",
     ],

@@ -124,7 +124,7 @@ def check_document(rng: np.random.Generator) -> None:
     """The same of tables whose plain data another program wrote, without care."""
     name = str(rng.choice([name for name in originals() if name.endswith(".exr")]))
     document = json.loads(documents()[name])
-    _mutate(rng, document)
+    mutate(rng, document)
     try:
         found = parse_document(document)
         # as many numbers as it declares, which `exr` compares with the file's size
@@ -155,7 +155,7 @@ def documents() -> dict[str, str]:
         return found
 
 
-def _mutate(rng: np.random.Generator, document: Any) -> None:
+def mutate(rng: np.random.Generator, document: Any) -> None:
     """Replace a value somewhere in nested data, or leave it out."""
     place = document
     while True:

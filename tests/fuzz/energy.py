@@ -26,12 +26,17 @@ _SAMPLES = 1 << 13, 1 << 17
 _GRAZING, _EXCESS, _ERRORS = 85.0, 0.005, 5.0
 #: Reflectances of the BSDF beneath, which Mitsuba accepts.
 _HOSTILE = (-1.0, -1e-9, 0.0, 0.5, 1.0, 1e30, float("nan"))
-#: Variants by their share. RGB variants have colours outside the gamut, which are negative, or
-#: above 1 as the red of gold: their luminance is at most 1.
+#: Variants by their share. Spectral variants have scales of energy at 16 wavelengths or more, which
+#: take 10 to 100 times as long as one. RGB variants have colours outside the gamut, which are
+#: negative, or above 1 as the red of gold: their luminance is at most 1.
 _VARIANTS = {
-    "llvm_ad_mono": 0.65, "llvm_ad_spectral": 0.2, "llvm_ad_mono_polarized": 0.1,
-    "llvm_ad_rgb": 0.05,
+    "llvm_ad_mono": 0.82, "llvm_ad_spectral": 0.07, "llvm_ad_mono_polarized": 0.07,
+    "llvm_ad_rgb": 0.04,
 }  # fmt: skip
+#: Materials by their share. Light that goes through has scales on both sides, along four paths.
+_KINDS = {"mirror": 0.2, "metal": 0.3, "dielectric": 0.26, "interface": 0.12, "sheet": 0.12}
+#: Share of surfaces whose window is one patch, which take ten times as long.
+_PATCHES = 0.12
 _TEXELS = (4, 4, 1)
 #: Of linear sRGB's channels.
 _LUMINANCE = (0.2126, 0.7152, 0.0722)
@@ -39,7 +44,7 @@ _LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any]:
     """A material with layers, a sheet or an interface; scales and speckle of any of them."""
-    kind = str(rng.choice(["mirror", "metal", "dielectric", "interface", "sheet"]))
+    kind = str(rng.choice(list(_KINDS), p=list(_KINDS.values())))
     index = 1.0 + log_uniform(rng, 0.01, 1.5)
     through = {"plugin": "diffraction_dielectric", "int_ior": index, "ext_ior": 1.0}
     chosen: dict[str, Any] = {
@@ -73,14 +78,15 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         chosen["shadowing"] = "vcavity"
     if layer == "stack":
         chosen |= {"layers": _stack(rng), "model": "kirchhoff"}
-    if rng.random() < 0.3:
+    if rng.random() < _PATCHES:
         chosen["coherence"] = "patch"
     for name, low, high in (("lateral_scale", 0.1, 2.0), ("height_scale", 1e-3, 1.5)):
         factor, drawn = log_uniform(rng, low, high), rng.random()
-        # scales of energy of a varying sheet take a minute
-        if drawn < 0.05 and "plugin" not in chosen:
+        # scales of energy of a varying sheet or patch, or of all wavelengths, take a minute
+        if drawn < 0.05 and mi.is_monochromatic and not {"plugin", "coherence"} & set(chosen):
             chosen[name] = _texture(rng.uniform(0.6, 1.0, _TEXELS) * factor)
-        elif drawn < 0.35:
+        # scales of energy of stretched heights that let light through take 10 s
+        elif drawn < (0.12 if name == "lateral_scale" and "plugin" in chosen else 0.35):
             chosen[name] = factor
     return chosen
 

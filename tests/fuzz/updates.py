@@ -38,8 +38,8 @@ def check(rng: np.random.Generator) -> None:
     if "int_ior" not in kind:
         del raw["ext_ior"]
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **raw, **kind))
-    names = [name for name, value in mi.traverse(bsdf) if dr.is_array_v(value)]
     values, state = _values(bsdf), _state(bsdf)
+    names = list(state)
     for _ in range(_UPDATES):
         chosen = rng.choice(names, int(rng.integers(1, len(names) + 1)), replace=False)
         update = {str(name): _number(rng, state[str(name)]) for name in chosen}
@@ -67,10 +67,11 @@ def _number(rng: np.random.Generator, now: Any) -> Any:
 
 
 def _state(bsdf: Any) -> dict[str, Any]:
+    """All numbers; heights are arrays, which test_data.py changes."""
     return {
         name: np.array(dr.detach(value), float).ravel()
         for name, value in mi.traverse(bsdf)
-        if dr.is_array_v(value)
+        if dr.is_array_v(value) and name != "data"
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import tomllib
 import zipfile
 from pathlib import Path
@@ -17,11 +18,20 @@ from mitsuba_diffraction.osl.blender_material import MaterialError, read_folder
 from tests.support.orders import thin_grating
 
 
-@pytest.fixture
-def folder(tmp_path: Path, some_variant: str) -> Path:
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An exported folder, which takes seconds: its error is measured."""
+    mi.set_variant("scalar_spectral")
     bsdf = mi.load_dict(md.bsdf_dict(thin_grating(), coherence_width=12.0))
-    md.osl.export(bsdf, tmp_path / "exported", "grating")
-    return tmp_path / "exported"
+    folder = tmp_path_factory.mktemp("addon") / "exported"
+    md.osl.export(bsdf, folder, "grating")
+    return folder
+
+
+@pytest.fixture
+def folder(tmp_path: Path, exported: Path) -> Path:
+    """A copy to be damaged."""
+    return Path(shutil.copytree(exported, tmp_path / "exported"))
 
 
 def test_the_archive_has_a_manifest_and_the_looks(folder: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 
@@ -40,17 +41,23 @@ ENERGETIC = Surface(
     md.DiffractionTable.build(PATCH, **DEFAULTS, height_scale_max=1.5), "mirror", 4.5,
     Quantity(0.0), energy_scale=scale_of,
 )  # fmt: skip
-TABLE = md.DiffractionTable.build(DEEP, **DEFAULTS)
-TEXTURES = patch_textures(TABLE)
+
+
+@functools.cache
+def deep():
+    """A table of deep heights, and its textures."""
+    table = md.DiffractionTable.build(DEEP, **DEFAULTS)
+    return table, patch_textures(table)
 
 
 @settings(deadline=None, max_examples=20)
 @given(st.floats(0.0, 1.0))
 def test_powers_are_those_of_the_table(share):
-    kappa = share * TABLE.expansion.kappa_max
-    exact = powers_at(TABLE, kappa)
+    table, textures = deep()
+    kappa = share * table.expansion.kappa_max
+    exact = powers_at(table, kappa)
     # terms are halves, of 11 digits; factors are off by 0.06²/8 between the ends of a cell
-    assert np.abs(interpolated(TEXTURES, kappa) - exact).sum() < 5e-4
+    assert np.abs(interpolated(textures, kappa) - exact).sum() < 5e-4
 
 
 def test_light_of_a_scan_is_kept_without_orders_of_negative_power():
@@ -67,15 +74,16 @@ def test_light_of_a_scan_is_kept_without_orders_of_negative_power():
 
 
 def test_draws_have_the_probabilities_that_weigh_them():
-    rows, columns = TABLE.grid.shape
-    last_x, last_y = TABLE.grid.last
-    for cells in TEXTURES.draws.reshape(BANDS, rows * columns, 4).astype(float):
+    table, textures = deep()
+    rows, columns = table.grid.shape
+    last_x, last_y = table.grid.last
+    for cells in textures.draws.reshape(BANDS, rows * columns, 4).astype(float):
         threshold, chance, x, y = cells.T
         other = ((y + last_y) * columns + x + last_x).astype(int)
         drawn = (threshold + np.bincount(other, 1.0 - threshold, len(other))) / len(other)
         assert drawn.sum() == pytest.approx(1.0)
         # halves have 11 digits, fewer below 6e-5 of what the largest is stored as
-        assert chance / TEXTURES.likelihood == pytest.approx(drawn, rel=5e-4, abs=1e-12)
+        assert chance / textures.likelihood == pytest.approx(drawn, rel=5e-4, abs=1e-12)
 
 
 @pytest.mark.parametrize(

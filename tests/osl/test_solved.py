@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 
 import mitsuba as mi
@@ -19,7 +20,12 @@ from tests.support.orders import thin_grating
 
 TABLE = thin_grating()
 TEXTURE = order_texture(TABLE)
-CONSTANTS = order_constants(TABLE, TEXTURE)
+
+
+@functools.cache
+def constants():
+    """Constants of the shader, whose error takes seconds to measure."""
+    return order_constants(TABLE, TEXTURE)
 
 
 def looked_up(x, y, wavelength, order):
@@ -32,15 +38,16 @@ def looked_up(x, y, wavelength, order):
         return 0.0
     packs = (band + 1 - kind + 3) // 4
     first = TEXTURE.starts[2 * band + kind] + j * packs + q // 4
-    tau, rho = float(cell.tau) * CONSTANTS["TAU"], float(cell.rho) * CONSTANTS["RHO"]
-    place = float(w) * CONSTANTS["W"]
-    slices = [min(int(place), CONSTANTS["W"]), min(int(place) + 1, CONSTANTS["W"])]
-    values = [pixel(first * (CONSTANTS["W"] + 1) + n, tau, rho)[q % 4] for n in slices]
+    size = constants()
+    tau, rho = float(cell.tau) * size["TAU"], float(cell.rho) * size["RHO"]
+    place = float(w) * size["W"]
+    slices = [min(int(place), size["W"]), min(int(place) + 1, size["W"])]
+    values = [pixel(first * (size["W"] + 1) + n, tau, rho)[q % 4] for n in slices]
     return np.interp(place - int(place), [0, 1], values)
 
 
 def pixel(tile, tau, rho):
-    across, width, height = TEXTURE.tiles_across, CONSTANTS["TAU"] + 1, CONSTANTS["RHO"] + 1
+    across, width, height = TEXTURE.tiles_across, constants()["TAU"] + 1, constants()["RHO"] + 1
     row, column = tile // across * height, tile % across * width
     a, b = min(int(tau), width - 2), min(int(rho), height - 2)
     four = TEXTURE.pixels[row + b : row + b + 2, column + a : column + a + 2].astype(float)

@@ -1,15 +1,18 @@
-"""`pdf` is the density of `sample`'s directions, for every kind of table."""
+"""`pdf` is the density of `sample`'s directions, for every kind of table; weights stay small."""
 
 from __future__ import annotations
 
 import math
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from tests.support import gentle
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
-from tests.support.directions import rough_patch
+from tests.support.directions import polar, rough_patch
+from tests.support.lanes import interaction, lanes, spectra
 
 pytestmark = [
     pytest.mark.thorough,
@@ -78,3 +81,17 @@ def test_the_density_is_that_of_the_samples(variant, request, name):
     assert test.run(0.01, len(CASES), quiet=True), test.messages
     # enough of the samples fall where the histogram looks to say something
     assert test.histogram_sum[0] > 0.01, test.messages
+
+
+@pytest.mark.parametrize("theta", [0.0, 50.0])
+def test_weights_stay_small_where_lobes_are_far_narrower_than_their_distance(some_variant, theta):
+    bsdf = gentle.load(rough_patch((60, 60), (0.13, 0.13), 0.1), coherence_width=400.0)
+    n = 1 << 15
+    rng = np.random.default_rng(4)
+    si = interaction(np.tile(polar(theta), (n, 1)), [(450.0, 500.0, 550.0, 650.0)])
+    s1, s2 = lanes(rng.random(n)), mi.Point2f(*map(lanes, rng.random((2, n))))
+    weights = spectra(bsdf.sample(mi.BSDFContext(), si, s1, s2)[1])
+    error = weights.std() / np.sqrt(n)
+    assert weights.mean() == pytest.approx(1.0, abs=5 * error + 0.01)  # a gentle mirror
+    assert weights.std() < 1.0
+    assert weights.max() < 60.0  # with cells as wide as eleven lobes 400

@@ -69,16 +69,6 @@ def test_values_are_finite_and_those_of_the_table(variant, name):
     assert np.abs(found[:, 0] - expected).sum() < 2e-4 * expected.sum()
 
 
-@pytest.mark.parametrize("name", ["1 nm", "2 × 2 pixels", "a window of ten"])
-def test_conserved_energy_and_samples_are_finite(variant, name):
-    field, width, parameters = CASES[name]
-    bsdf = mi.load_dict(
-        md.bsdf_dict(field, coherence_width=width * min(field.extent), **parameters)
-    )
-    wi, wo, lam = extreme_pairs()
-    assert np.all(np.isfinite(evaluated(bsdf, wi, wo, lam[:, None])))
-
-
 @pytest.mark.parametrize(
     "parameters", [{}, {"energy_conserving": True}, {"shadowing": "vcavity"}, {"int_ior": 1.5}]
 )

@@ -50,15 +50,6 @@ def dielectric(cos_theta, eta):
     return 0.5 * (perpendicular**2 + parallel**2)
 
 
-def conductor(cos_theta, eta, k):
-    """The same for a complex index η + ik."""
-    index = eta + 1j * k
-    cos_t = np.sqrt(1 - (1 - cos_theta**2) / index**2)
-    perpendicular = (cos_theta - index * cos_t) / (cos_theta + index * cos_t)
-    parallel = (index * cos_theta - cos_t) / (index * cos_theta + cos_t)
-    return 0.5 * (np.abs(perpendicular) ** 2 + np.abs(parallel) ** 2)
-
-
 @pytest.fixture
 def pairs():
     """Direction pairs within reach of a mirror's lobe, at all angles."""
@@ -91,11 +82,6 @@ def test_dielectrics(some_variant, pairs, parameters, eta):
     assert ratios(*pairs, 550.0, **parameters)[:, 0] == pytest.approx(expected, rel=1e-5)
 
 
-def test_a_conductor_by_its_indices(variant, pairs):
-    expected = conductor(mirror_cosines(*pairs), 0.9, 6.0)
-    assert ratios(*pairs, 550.0, eta=0.9, k=6.0)[:, 2] == pytest.approx(expected, rel=1e-5)
-
-
 def test_a_conductor_by_its_name_is_mitsuba_s(variant):
     wavelengths = [400.0, 480.0, 560.0, 700.0]
     wi = [polar(t) for t in (0, 40, 75)]
@@ -107,12 +93,6 @@ def test_a_conductor_by_its_name_is_mitsuba_s(variant):
     _, theirs = smooth.sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.5))
     assert ours == pytest.approx(spectra(theirs), rel=1e-4)  # the half vector, in single precision
     assert ours[0, 0] < 0.5 < ours[0, 3]  # gold is yellow
-
-
-def test_reflectance_is_applied_once(some_variant):
-    # normal incidence on 1.5/1: ((1.5 − 1)/(1.5 + 1))² = 0.04, not its square
-    ratio = ratios(polar(0), [polar(0)], 550.0, int_ior=1.5, ext_ior=1.0)
-    assert ratio[0, 0] == pytest.approx(0.04, rel=1e-5)
 
 
 def test_an_index_of_one_reflects_nothing(some_variant):

@@ -10,28 +10,12 @@ import pytest
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.elements import check_attributes
 from tests.support.directions import polar
-from tests.support.gentle import load, pairs
+from tests.support.gentle import UV, bitmap, hits, load, pairs
 from tests.support.lanes import vectors
 
 pytestmark = pytest.mark.thorough
 
 FACTORS = np.array([[0.25, 1.25], [0.8, 0.0]], np.float32)
-#: Middles of the texels.
-UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]], np.float32)
-
-
-def bitmap(values=FACTORS, **more):
-    """A raw bitmap of these factors, not interpolated."""
-    data = mi.TensorXf(np.ascontiguousarray(values[..., None]))
-    return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
-
-
-def hits(wi, uv):
-    """Surface interactions at one pair of UV coordinates."""
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
-    si.wi, si.sh_frame = vectors(wi), mi.Frame3f(mi.Normal3f(0, 0, 1))
-    si.uv = mi.Point2f(*uv.tolist())
-    return si
 
 
 @pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")  # of what is taken
@@ -67,31 +51,10 @@ def test_each_place_is_as_with_the_number_that_it_has(mono, parameters):
 
 
 def test_worn_smooth_it_is_a_mirror(mono):
-    bsdf = load(height_scale=bitmap())
+    bsdf = load(height_scale=bitmap(FACTORS))
     si = hits(np.array([polar(0.0)]), UV[3])
     up, aside = (bsdf.eval(mi.BSDFContext(), si, vectors(polar(a)))[0][0] for a in (0.0, 20.0))
     assert aside < 1e-6 * up
-
-
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")  # of what is taken
-def test_derivatives_with_respect_to_factors_are_those_of_differences(mono):
-    wi, wo, _ = pairs(60)
-    bsdf = load(height_scale=bitmap(), energy_conserving=True, height_scale_max=1.5)
-    parameters, si = mi.traverse(bsdf), hits(wi, UV[2])
-
-    def total(step):
-        step = mi.TensorXf(mi.Float(step), (1, 1, 1)) * mi.TensorXf(
-            [[[0.0], [0.0]], [[1.0], [0.0]]]
-        )
-        parameters["height_scale.data"] = mi.TensorXf(FACTORS[..., None]) + step
-        parameters.update()
-        return dr.sum(bsdf.eval(mi.BSDFContext(), si, vectors(wo))[0])
-
-    difference = (total(0.01) - total(-0.01))[0] / 0.02
-    dr.enable_grad(step := mi.Float(0.0))
-    found = total(step)
-    dr.forward_from(step)
-    assert dr.grad(found)[0] == pytest.approx(difference, rel=1e-2)  # its curvature and rounding
 
 
 def test_a_mesh_attribute_is_read(mono):

@@ -14,21 +14,13 @@ from mitsuba_diffraction.scene.elements import check_attributes
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import as_single, lit_pairs
 from tests.support.furnace import furnace, sinusoid
-from tests.support.gentle import PATCH, WIDTH, load, pairs
-from tests.support.lanes import brdf_values, evaluated, interaction, lanes, refusal, vectors
+from tests.support.gentle import PATCH, UV, WIDTH, bitmap, hits, load, pairs
+from tests.support.lanes import brdf_values, evaluated, interaction, refusal, vectors
 from tests.support.transmitting import BELOW, OneSide
 
 pytestmark = pytest.mark.thorough
 
 FACTORS = np.array([[0.6, 1.3], [0.8, 1.0]], np.float32)
-#: Middles of the texels.
-UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]], np.float32)
-
-
-def bitmap(values=FACTORS, **more):
-    """A raw bitmap of these factors, not interpolated."""
-    data = mi.TensorXf(np.ascontiguousarray(values[..., None]))
-    return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
 
 
 def stretched(factor, largest=None):
@@ -96,13 +88,11 @@ def test_steep_light_within_is_that_of_stretched_heights(mono):
 
 
 def test_values_at_each_place_are_the_reference_s_of_its_factor(mono):
-    varying = load(lateral_scale=bitmap())
+    varying = load(lateral_scale=bitmap(FACTORS))
     for factor, uv in zip(FACTORS.ravel(), UV, strict=True):
         heights, width = stretched(float(factor), 1.3)
         wi, wo, _, _ = lit_pairs(heights, sigma_of(width), 60, 1)
-        si = interaction(wi, 550.0)
-        si.uv = mi.Point2f(*(lanes(np.full(len(wi), x)) for x in uv))
-        values = np.array(varying.eval(mi.BSDFContext(), si, vectors(wo))[0])
+        values = np.array(varying.eval(mi.BSDFContext(), hits(wi, uv), vectors(wo))[0])
         exact = reference.brdf(heights, wi, wo, 550.0, coherence_width=width) * wo[:, 2]
         assert np.abs(values - exact).sum() < 1e-3 * exact.sum()
 
@@ -141,26 +131,6 @@ def test_the_density_is_that_of_the_samples(some_variant, through, texture):
     bsdf = OneSide(case.load(), -1.0) if through else case.load()
     test = chi_square(bsdf, case, samples=1 << 19)
     assert test.run(0.01, 4, quiet=True), test.messages
-
-
-def test_derivatives_with_respect_to_a_texture_are_those_of_differences(mono):
-    wi, wo, _ = pairs(60)
-    bsdf, si = load(lateral_scale=bitmap()), interaction(wi, 550.0)
-    si.uv = mi.Point2f(*(lanes(np.full(len(wi), x)) for x in UV[2]))
-    parameters = mi.traverse(bsdf)
-    place = mi.TensorXf([[[0.0], [0.0]], [[1.0], [0.0]]])
-
-    def total(step):
-        data = mi.TensorXf(FACTORS[..., None]) + mi.TensorXf(mi.Float(step), (1, 1, 1)) * place
-        parameters["lateral_scale.data"] = data
-        parameters.update()
-        return dr.sum(bsdf.eval(mi.BSDFContext(), si, vectors(wo))[0])
-
-    difference = (total(2e-3) - total(-2e-3))[0] / 4e-3
-    dr.enable_grad(step := mi.Float(0.0))
-    value = total(step)
-    dr.forward_from(step)
-    assert dr.grad(value)[0] == pytest.approx(difference, rel=1e-2)  # its curvature and rounding
 
 
 def test_without_it_kernels_have_no_operation_for_it(mono):

@@ -96,10 +96,13 @@ def check():
 @pytest.mark.parametrize(
     "order",
     [
-        "import mitsuba as mi; mi.set_variant('{0}'); import mitsuba_diffraction as md",
+        pytest.param(
+            "import mitsuba as mi; mi.set_variant('{0}'); import mitsuba_diffraction as md",
+            marks=pytest.mark.thorough,
+        ),
         "import mitsuba as mi; import mitsuba_diffraction as md; mi.set_variant('scalar_rgb'); "
         "mi.set_variant('{0}'); mi.set_variant('llvm_ad_rgb'); mi.set_variant('{0}')",
-        DISCOVERY,
+        pytest.param(DISCOVERY, marks=pytest.mark.thorough),
     ],
     ids=["variant first", "several variants", "discovered by Mitsuba"],
 )

@@ -136,7 +136,7 @@ def test_a_surface_reflects_what_the_stack_does_at_the_mirrors_angle(tmp_path, s
     assert "a stack of layers" in GLSL.refusal(described)
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono_polarized"])
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_mono_polarized"])
 def test_no_direction_reflects_more_than_it_receives(tmp_path, variant):
     if reason := obstacle(variant):
         pytest.skip(reason)

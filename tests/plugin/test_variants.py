@@ -115,20 +115,6 @@ def test_a_picture_of_directions_turns_as_degrees_do(every_variant: str) -> None
     assert turned == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
 
 
-def test_one_wavelength_is_the_spectrum_there() -> None:
-    if not runs("llvm_ad_mono"):
-        pytest.skip("llvm_ad_mono: Dr.Jit finds no device for it")
-    wi, wo, samples = pairs()
-    found = []
-    for name in ("llvm_ad_mono", "llvm_ad_spectral"):
-        mi.set_variant(name)
-        bsdf = load(material="Au", wavelength=600.0)
-        found.append(evaluate(bsdf, wi, wo, samples, np.full((N, 4), 600.0))[0])
-    mono, spectral = found
-    # gold's index is interpolated in double and in single precision
-    assert mono == pytest.approx(spectral[:, :1], rel=1e-4, abs=1e-6 * spectral.max())
-
-
 def test_a_wavelength_outside_the_table_is_refused(every_variant: str) -> None:
     with pytest.raises(RuntimeError, match="wavelength=900 nm is outside the table's 360 to 830"):
         load(wavelength=900.0)

@@ -10,7 +10,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
 from tests.support.directions import lit_pairs, uniform_directions
-from tests.support.gentle import PATCH, WIDTH, load
+from tests.support.gentle import PATCH, WIDTH, hits, load
 from tests.support.lanes import interaction, refusal, spectra, vectors
 
 pytestmark = pytest.mark.thorough
@@ -114,14 +114,6 @@ def test_the_mean_is_the_ensemble_s_and_the_contrast_that_of_independent_windows
         assert contrast == pytest.approx(1 / np.sqrt(n), rel=0.05)
 
 
-def hits(wi, uv):
-    """Surface interactions at UV coordinates."""
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
-    si.wi, si.sh_frame = vectors(wi), mi.Frame3f(mi.Normal3f(0, 0, 1))
-    si.uv = mi.Point2f(*(np.ascontiguousarray(c, np.float32) for c in uv.T))
-    return si
-
-
 def test_random_tiles_do_not_repeat_and_periodic_ones_do(mono):
     wi, wo, _, _ = lit_pairs(PATCH, sigma_of(WIDTH), 100, 3)
     here, again = hits(wi, places(100)), hits(wi, places(100) + np.array(PATCH.extent) / 10.0)
@@ -161,24 +153,6 @@ def test_kernels_of_other_coherences_know_no_places(mono):
     for parameters, alike in (({}, True), ({"coherence": "patch"}, True), (ON_SURFACE, False)):
         bsdf = load(**parameters)
         assert (operations(bsdf, anywhere) == operations(bsdf, nowhere)) == alike
-
-
-def test_derivatives_with_respect_to_heights_are_those_of_differences(mono):
-    wi, wo, _, _ = lit_pairs(PATCH, sigma_of(WIDTH), 60, 3)
-    parameters = mi.traverse(bsdf := load(**ON_SURFACE, tiling="random"))
-    si = hits(wi, places(60))
-
-    def total(scale):
-        parameters["height_scale"] = scale
-        parameters.update()
-        return dr.sum(bsdf.eval(mi.BSDFContext(), si, vectors(wo))[0])
-
-    difference = (total(mi.Float(1.02)) - total(mi.Float(0.98)))[0] / 0.04
-    dr.enable_grad(scale := mi.Float(1.0))
-    found = total(scale)
-    dr.forward_from(scale)
-    # the rounding and curvature of a difference over 4 %
-    assert dr.grad(found)[0] == pytest.approx(difference, rel=1e-2)
 
 
 def test_variants_without_wavelengths_refuse_places():

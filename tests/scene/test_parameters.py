@@ -33,6 +33,13 @@ def test_defaults_and_uses_are_found_in_includes_too(scene):
     assert parameters_of(scene) == {"spp": "16", "part": "light", "power": "2", "needed": None}
 
 
+def test_of_two_defaults_the_first_counts(tmp_path):
+    defaults = "".join(f'<default name="a" value="{value}"/>' for value in (1, 2))
+    file = tmp_path / "twice.xml"
+    file.write_text(f'<scene version="3.0.0">{defaults}<float name="x" value="$a"/></scene>')
+    assert parameters_of(file) == {"a": "1"}
+
+
 def test_an_unknown_parameter_is_answered_with_those_there_are(scene):
     with pytest.raises(DiffractionError) as caught:
         check_parameters(scene, {"sp": "4"})

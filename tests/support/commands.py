@@ -31,18 +31,10 @@ _NARROW = ["--wavelength-range", "590:610"]
 SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
-    "evaluate": [
-        "--step",
-        "50",
-        "--angle-step",
-        "2",
-        "--positions",
-        "2",
-        "--coherence-width",
-        "10",
-    ],
+    "evaluate": ["--step", "50", "--angle-step", "2", "--positions", "2", "--coherence-width=10"],
     "solve": ["--period", "0.6", "--resolution", "80", "--tolerance", "0.2", *_NARROW],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
+    "export-bsdf": ["--theta", "0,40", "--phi", "0,180", "--resolution", "8"],
     "export-viewer": ["--method", "exact"],
     "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
     "survey": ["--coherence-width", "4", "--tolerance", "0.05", "--resolution", "16"],
@@ -119,8 +111,15 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if "--import" in rest or (command == "export-shader" and rest[0].endswith(".nc")):
         return []  # as small as its file
     if any(word.startswith("--theta") for word in rest) and command == "solve":
-        return ["--wavelength-range", "550:555"]
+        few = ["--wavelength-range", "550:555"]
+        if "." not in rest[0]:  # of a solver's work, the least: shallow grooves
+            few += ["--period", "0.6", "--depth", "0.03", "--resolution", "48"]
+        if "." not in rest[0] and not {"--layer", "--beneath"} & set(rest):
+            few += _PERFECT
+        return few
     small = SMALL.get(command, [])
+    if command == "export-bsdf" and "--wavelength" not in rest:
+        return [*small, "--wavelength", "500,600"]
     if "--block" in rest:  # by coupled waves
         return [*small, "--period", "0.3", "--resolution", "10"]
     if "--thin" in rest:
@@ -188,6 +187,7 @@ def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Run a page's commands in a folder of `small_tree`."""
     # of height scales that a page may be asked for, one
     monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (0.0,))
+    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 8)
     monkeypatch.chdir(tree)
     for words in commands(page):
         run(words)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import sigma_of
-from tests.support.directions import lit_pairs, rough_patch
+from tests.support.directions import Array, lit_pairs, rough_patch
+from tests.support.lanes import interaction, lanes
 
 #: 4.76 × 5.28 µm, gentle, its pixels and its numbers of them unequal: nothing is symmetric.
 PATCH = rough_patch((66, 56), (0.085, 0.08), 0.08)
@@ -24,3 +29,20 @@ def load(field=PATCH, **parameters):
 def pairs(n=200, seed=1, field=PATCH):
     """Directions and wavelengths where light goes."""
     return lit_pairs(field, sigma_of(WIDTH), n, seed)[:3]
+
+
+#: Middles of the texels of a bitmap of 2 × 2.
+UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]], np.float32)
+
+
+def bitmap(values: Array, **more: Any) -> dict[str, Any]:
+    """A raw bitmap of these numbers, not interpolated."""
+    data = mi.TensorXf(np.ascontiguousarray(values[..., None]))
+    return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
+
+
+def hits(wi: Array, uv: ArrayLike, wavelengths: ArrayLike = 550.0) -> Any:
+    """Surface interactions at UV coordinates (2,) or (n, 2)."""
+    si = interaction(wi, wavelengths)
+    si.uv = mi.Point2f(*map(lanes, np.broadcast_to(uv, (len(wi), 2)).T))
+    return si

@@ -68,8 +68,8 @@ def postscript(file: Path) -> Path:
 
 #: Text of a file outside of the folder, which nothing may print.
 PRIVATE = "PRIVATE"
-#: Suffixes of pipes.
-PIPES = ("xml", "png", "npy", "csv", "toml", "nc", "ply", "exr", "gltf", "tif", "spm")
+#: Suffixes of pipes that scenes name.
+PIPES = ("xml", "png", "npy", "csv", "toml", "nc")
 _BENIGN = """<scene version="3.0.0"><integrator type="path"/>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="6"/>
 <integer name="height" value="4"/></film><sampler type="independent">
@@ -203,48 +203,46 @@ def _square() -> TriangleMesh:
     return TriangleMesh(positions, normals, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-# Each command runs in a copy of a process that has only imported the package: what Mitsuba has
+# Each group runs in a copy of a process that has only imported the package: what Mitsuba has
 # loaded once, it loads no more.
 _RUNNER = """
 import json, os, signal, sys
 from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.realtime.glsl import bounces
 from tests.support.coarse import coarse_energy
 from tests.support.kernels import compile_quickly
 
 coarse_energy()
 compile_quickly()
+bounces._POINTS = 1 << 8
 
-def run(words, files):
-    process = os.fork()
-    if process == 0:
+def run(group, names):
+    if process := os.fork():
+        os.waitpid(process, 0)
+        return
+    for words, name in zip(group, names):
         signal.alarm(90)
-        for descriptor, file in enumerate(files, 1):
-            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT), descriptor)
-        code = 70
+        for descriptor, kind in enumerate(("out", "err"), 1):
+            os.dup2(os.open(f"{name}.{kind}", os.O_WRONLY | os.O_CREAT), descriptor)
         try:
             code = main(words)
         finally:
             sys.stdout.flush()
             sys.stderr.flush()
-            os._exit(code)
-    code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-    return [code, *(open(file).read() for file in files)]
+        open(f"{name}.code", "w").write(str(code))
+    os._exit(0)
 
-if __name__ == "__main__":
-    outputs, results = sys.argv[2], []
-    for number, words in enumerate(json.load(open(sys.argv[1]))):
-        files = [os.path.join(outputs, f"{number}.{name}") for name in ("out", "err")]
-        results.append(run(words, files))
-    json.dump(results, open(os.path.join(outputs, "results.json"), "w"))
+for n, group in enumerate(json.load(open(sys.argv[1]))):
+    run(group, [os.path.join(sys.argv[2], f"{n}.{k}") for k in range(len(group))])
 """
 
 
-def run_in(folder: Folder, commands: Sequence[Sequence[str]]) -> list[Ran]:
-    """Run commands in the folder, each in a process of its own, and return their results."""
+def run_in(folder: Folder, groups: Sequence[Sequence[Sequence[str]]]) -> list[Ran]:
+    """Run commands in the folder, each group in a process of its own, and return their results."""
     work = folder.path.parent / "run"
     work.mkdir()
     (work / "run.py").write_text(_RUNNER)
-    (work / "commands.json").write_text(json.dumps(commands))
+    (work / "commands.json").write_text(json.dumps(groups))
     subprocess.run(
         [sys.executable, work / "run.py", work / "commands.json", work],
         cwd=folder.path,
@@ -256,4 +254,10 @@ def run_in(folder: Folder, commands: Sequence[Sequence[str]]) -> list[Ran]:
         },
         check=True,
     )
-    return [Ran(*result) for result in json.loads((work / "results.json").read_text())]
+    names = [work / f"{n}.{k}" for n, group in enumerate(groups) for k in range(len(group))]
+
+    def read(name: Path, kind: str, missing: str) -> str:
+        file = name.with_name(f"{name.name}.{kind}")
+        return file.read_text() if file.exists() else missing
+
+    return [Ran(int(read(n, "code", "70")), read(n, "out", ""), read(n, "err", "")) for n in names]

@@ -134,10 +134,10 @@ def on_all_sides(wi: Array, wo: Array) -> tuple[Array, Array]:
     return wi, wo
 
 
-def reference_on_all_sides(table: OrderTable, wi: Array, wo: Array, wavelength: Array) -> Array:
-    """The reference of a thin sheet, times |cosθo|, for directions above or below."""
+def reference_light(table: OrderTable, wi: Array, wo: Array, wavelength: Array) -> Array:
+    """The reference times |cosθo|; of a thin sheet for directions above or below."""
     values, up = np.zeros(len(wi)), np.array([1.0, 1.0, -1.0])
-    for from_below, transmitted in itertools.product((False, True), (False, True)):
+    for from_below, transmitted in itertools.product((False, True)[: table.sides], repeat=2):
         here = ((wi[:, 2] < 0.0) == from_below) & ((wi[:, 2] * wo[:, 2] < 0.0) == transmitted)
         efficiency = functools.partial(
             table.efficiency, from_below=from_below, transmitted=transmitted

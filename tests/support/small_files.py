@@ -46,6 +46,17 @@ def hostile(
     return register
 
 
+def small(
+    name: str, read: Callable[[Path], object], content: Callable[[], str | bytes], needs: str = ""
+) -> None:
+    """Register the file `name` of this content."""
+
+    @hostile(name, read, needs)
+    def write(path: Path) -> None:
+        made = content()
+        path.write_bytes(made if isinstance(made, bytes) else made.encode())
+
+
 # --- readers -------------------------------------------------------------------------------------
 def heights(path: Path) -> object:
     import mitsuba_diffraction as md
@@ -145,74 +156,34 @@ def archive(*members: tuple[str, int, int]) -> bytes:
     return content + directory + b"PK\x05\x06" + end
 
 
-@hostile("bomb.x3p", heights)
-def _(path: Path) -> None:
-    path.write_bytes(archive(("main.xml", 1 << 31, 1 << 31)))
-
-
-@hostile("text.x3p", heights)
-def _(path: Path) -> None:
-    path.write_bytes(archive(("main.xml", 1 << 28, 1 << 28)))
-
-
-@hostile("lying.x3p", heights, "SurfaceTopography")
-def _(path: Path) -> None:
-    path.write_bytes(archive(("main.xml", 1 << 31, 10)))
-
-
-@hostile("bomb.plux", heights)
-def _(path: Path) -> None:
-    path.write_bytes(archive(("index.xml", 1 << 24, 1 << 24), ("LAYER_0.raw", 1 << 31, 1 << 31)))
-
-
-@hostile("nmm.zip", heights)
-def _(path: Path) -> None:
-    path.write_bytes(archive(("s.dsc", 1 << 20, 1 << 20), ("s_1_1.dat", 1 << 31, 1 << 31)))
-
-
-@hostile("zeros.npz", heights)
-def _(path: Path) -> None:
-    path.write_bytes(archive(("a.npy", 1 << 31, 1 << 31)))
-
-
-@hostile("zeros.png", heights)
-def _(path: Path) -> None:
-    path.write_bytes(png(12_000, 12_000))
-
-
-@hostile("long_line.csv", heights)
-def _(path: Path) -> None:
-    path.write_text("1," * 2_500_000)
-
-
-@hostile("long_cell.csv", heights)
-def _(path: Path) -> None:
-    path.write_text("1" * 5_000_000)
-
-
-@hostile("long_line.dat", heights)
-def _(path: Path) -> None:
-    path.write_text("1 " * 4_000_000)
-
-
-@hostile("layers.toml", layers)
-def _(path: Path) -> None:
-    path.write_text("repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n")
-
-
-@hostile("solved_layers.toml", solved_layers)
-def _(path: Path) -> None:
-    path.write_text("repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n")
-
-
-@hostile("dots.toml", heights)
-def _(path: Path) -> None:
-    path.write_text("a." * 490_000 + "b = 1\n")
-
-
-@hostile("sources.toml", heights)
-def _(path: Path) -> None:
-    path.write_text("source = [" + '"a",' * 240_000 + "]\n")
+small("bomb.x3p", heights, lambda: archive(("main.xml", 1 << 31, 1 << 31)))
+small("text.x3p", heights, lambda: archive(("main.xml", 1 << 28, 1 << 28)))
+small("lying.x3p", heights, lambda: archive(("main.xml", 1 << 31, 10)), "SurfaceTopography")
+small(
+    "bomb.plux",
+    heights,
+    lambda: archive(("index.xml", 1 << 24, 1 << 24), ("LAYER_0.raw", 1 << 31, 1 << 31)),
+)
+small(
+    "nmm.zip",
+    heights,
+    lambda: archive(("s.dsc", 1 << 20, 1 << 20), ("s_1_1.dat", 1 << 31, 1 << 31)),
+)
+small("zeros.npz", heights, lambda: archive(("a.npy", 1 << 31, 1 << 31)))
+small("zeros.png", heights, lambda: png(12_000, 12_000))
+small("long_line.csv", heights, lambda: "1," * 2_500_000)
+small("long_cell.csv", heights, lambda: "1" * 5_000_000)
+small("long_line.dat", heights, lambda: "1 " * 4_000_000)
+small(
+    "layers.toml", layers, lambda: "repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n"
+)
+small(
+    "solved_layers.toml",
+    solved_layers,
+    lambda: "repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n",
+)
+small("dots.toml", heights, lambda: "a." * 490_000 + "b = 1\n")
+small("sources.toml", heights, lambda: "source = [" + '"a",' * 240_000 + "]\n")
 
 
 @hostile("seeds.toml", heights)

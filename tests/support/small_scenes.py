@@ -6,9 +6,10 @@ import json
 import struct
 import sys
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
-from tests.support.small_files import FILES, hostile, mesh, pigment, png, run, scene
+from tests.support.small_files import FILES, hostile, mesh, pigment, png, run, scene, small
 
 __all__ = ["FILES"]
 
@@ -26,9 +27,12 @@ _LIST = "property list uchar int vertex_indices\n"
 _XYZ = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
 
 
-@hostile("index.ply", mesh)
-def _(path: Path) -> None:
-    path.write_bytes(_ply(3, _LIST, _XYZ + struct.pack("<B3i", 3, 0, 1, 400_000_000), 1))
+def _to(index: int) -> bytes:
+    """A triangle of vertices 0, 1 and this one."""
+    return struct.pack("<B3i", 3, 0, 1, index)
+
+
+small("index.ply", mesh, lambda: _ply(3, _LIST, _XYZ + _to(400_000_000), 1))
 
 
 def scene_of(body: str) -> str:
@@ -39,18 +43,18 @@ def _shape(kind: str, file: str) -> str:
     return scene_of(f'<shape type="{kind}"><string name="filename" value="{file}"/></shape>')
 
 
-@hostile("index_ply.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".ply")
-    mesh.write_bytes(_ply(3, _LIST, _XYZ + struct.pack("<B3i", 3, 0, 1, 400_000_000), 1))
-    path.write_text(_shape("ply", mesh.name))
+def shaped(name: str, kind: str, content: Callable[[], str | bytes]) -> None:
+    """Register a scene with one shape, whose mesh has this content."""
+
+    @hostile(name, scene)
+    def write(path: Path) -> None:
+        made, file = content(), path.with_suffix(f".{kind}")
+        file.write_bytes(made if isinstance(made, bytes) else made.encode())
+        path.write_text(_shape(kind, file.name))
 
 
-@hostile("negative_ply.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".ply")
-    mesh.write_bytes(_ply(3, _LIST, _XYZ + struct.pack("<B3i", 3, 0, 1, -1), 1))
-    path.write_text(_shape("ply", mesh.name))
+shaped("index_ply.xml", "ply", lambda: _ply(3, _LIST, _XYZ + _to(400_000_000), 1))
+shaped("negative_ply.xml", "ply", lambda: _ply(3, _LIST, _XYZ + _to(-1), 1))
 
 
 def serialized(index: int, vertices: int = 3, faces: int = 1, cut: int | None = None) -> bytes:
@@ -61,78 +65,32 @@ def serialized(index: int, vertices: int = 3, faces: int = 1, cut: int | None = 
     return packed + struct.pack("<QI", 0, 1)
 
 
-@hostile("index_serialized.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".serialized")
-    mesh.write_bytes(serialized(400_000_000))
-    path.write_text(_shape("serialized", mesh.name))
-
-
-@hostile("count_serialized.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".serialized")
-    mesh.write_bytes(serialized(2, vertices=300_000_000))
-    path.write_text(_shape("serialized", mesh.name))
-
-
-@hostile("count_ply.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".ply")
-    mesh.write_bytes(_ply(400_000_000, _LIST, _XYZ + struct.pack("<B3i", 3, 0, 1, 2), 1))
-    path.write_text(_shape("ply", mesh.name))
-
-
-@hostile("faces_ply.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".ply")
-    mesh.write_bytes(_ply(3, _LIST, _XYZ + struct.pack("<B3i", 3, 0, 1, 2), 400_000_000))
-    path.write_text(_shape("ply", mesh.name))
-
-
-@hostile("no_properties.ply", mesh)
-def _(path: Path) -> None:
-    path.write_bytes(_ply(3, "", _XYZ, 2_000_000_000))
-
-
-@hostile("no_properties_vertex.ply", mesh)
-def _(path: Path) -> None:
-    path.write_bytes(
+shaped("index_serialized.xml", "serialized", lambda: serialized(400_000_000))
+shaped("count_serialized.xml", "serialized", lambda: serialized(2, vertices=300_000_000))
+shaped("count_ply.xml", "ply", lambda: _ply(400_000_000, _LIST, _XYZ + _to(2), 1))
+shaped("faces_ply.xml", "ply", lambda: _ply(3, _LIST, _XYZ + _to(2), 400_000_000))
+small("no_properties.ply", mesh, lambda: _ply(3, "", _XYZ, 2_000_000_000))
+small(
+    "no_properties_vertex.ply",
+    mesh,
+    lambda: (
         b"ply\nformat binary_little_endian 1.0\nelement vertex 2000000000\n"
-        b"element face 1\n" + _LIST.encode() + b"end_header\n" + struct.pack("<B3i", 3, 0, 1, 2)
-    )
-
-
-@hostile("other_list.ply", mesh)
-def _(path: Path) -> None:
-    path.write_bytes(_ply(3, "property list uchar int flags\n", _XYZ + bytes(10), 2_000_000_000))
-
-
-@hostile("obj_index.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".obj")
-    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 400000000\n")
-    path.write_text(_shape("obj", mesh.name))
-
-
-@hostile("obj_negative.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".obj")
-    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -400000000\n")
-    path.write_text(_shape("obj", mesh.name))
-
-
-@hostile("obj_uv.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".obj")
-    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/9 2/1 3/400000000\n")
-    path.write_text(_shape("obj", mesh.name))
-
-
-@hostile("obj_zero.xml", scene)
-def _(path: Path) -> None:
-    mesh = path.with_suffix(".obj")
-    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 0 1 2\nf 1/0/0 2/0/0 3/0/0\n")
-    path.write_text(_shape("obj", mesh.name))
+        b"element face 1\n" + _LIST.encode() + b"end_header\n" + _to(2)
+    ),
+)
+small(
+    "other_list.ply",
+    mesh,
+    lambda: _ply(3, "property list uchar int flags\n", _XYZ + bytes(10), 2_000_000_000),
+)
+shaped("obj_index.xml", "obj", lambda: "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 400000000\n")
+shaped("obj_negative.xml", "obj", lambda: "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -400000000\n")
+shaped("obj_uv.xml", "obj", lambda: "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/9 2/1 3/400000000\n")
+shaped(
+    "obj_zero.xml",
+    "obj",
+    lambda: "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 0 1 2\nf 1/0/0 2/0/0 3/0/0\n",
+)
 
 
 def gltf(**changes: object) -> dict[str, object]:
@@ -191,9 +149,9 @@ def _with_picture(data: bytes) -> dict[str, object]:
     )  # fmt: skip
 
 
-@hostile("circle.gltf", mesh, "trimesh")
-def _(path: Path) -> None:
-    path.write_text(json.dumps(gltf(nodes=[{"mesh": 0, "children": [0]}])))
+small(
+    "circle.gltf", mesh, lambda: json.dumps(gltf(nodes=[{"mesh": 0, "children": [0]}])), "trimesh"
+)
 
 
 @hostile("tree.gltf", mesh, "trimesh")
@@ -211,11 +169,9 @@ def _(path: Path) -> None:
     path.write_text(json.dumps(document))
 
 
-@hostile("pigment.gltf", pigment, "trimesh")
-def _(path: Path) -> None:
-    path.write_text(json.dumps(_with_picture(png(13_000, 13_000, 8, 4))))
-
-
+small(
+    "pigment.gltf", pigment, lambda: json.dumps(_with_picture(png(13_000, 13_000, 8, 4))), "trimesh"
+)
 _USD = """#usda 1.0
 def Mesh "m"
 {
@@ -226,20 +182,12 @@ def Mesh "m"
 """
 
 
-@hostile("count.usda", mesh, "pxr")
-def _(path: Path) -> None:
-    path.write_text(_USD % "2000000000")
-
-
+small("count.usda", mesh, lambda: _USD % "2000000000", "pxr")
 # --- scenes --------------------------------------------------------------------------------------
-@hostile("deep.xml", scene)
-def _(path: Path) -> None:
-    path.write_text(scene_of('<bsdf type="twosided">' * 8000 + "</bsdf>" * 8000))
-
-
-@hostile("deeper.xml", scene)
-def _(path: Path) -> None:
-    path.write_text(scene_of('<bsdf type="twosided">' * 200_000 + "</bsdf>" * 200_000))
+small("deep.xml", scene, lambda: scene_of('<bsdf type="twosided">' * 8000 + "</bsdf>" * 8000))
+small(
+    "deeper.xml", scene, lambda: scene_of('<bsdf type="twosided">' * 200_000 + "</bsdf>" * 200_000)
+)
 
 
 @hostile("entities.xml", scene)
@@ -261,9 +209,7 @@ def _(path: Path) -> None:
     path.write_text(scene_of('<include filename="includes0.xml"/>'))
 
 
-@hostile("itself.xml", scene)
-def _(path: Path) -> None:
-    path.write_text(scene_of(f'<include filename="{path.name}"/>' * 4))
+small("itself.xml", scene, lambda: scene_of('<include filename="itself.xml"/>' * 4))
 
 
 @hostile("references.xml", scene)

@@ -12,7 +12,6 @@ import pytest
 from mitsuba_diffraction import (
     DiffractionError,
     DiffractionTable,
-    DiffractionWarning,
     HeightField,
 )
 from mitsuba_diffraction.settings import TableSettings
@@ -109,21 +108,6 @@ def test_tables_of_another_format_are_built_anew(monkeypatch):
     build.table()
     source._tables.clear()
     monkeypatch.setattr(source, "FORMAT_VERSION", 99)
-    build.table()
-    assert build.built == 2
-
-
-@pytest.mark.parametrize("content", [b"", b"half a table"])
-def test_a_damaged_file_is_replaced(folder, content):
-    build = Builder()
-    build.table()
-    (file,) = folder.iterdir()
-    file.write_bytes(content)
-    source._tables.clear()
-    with pytest.warns(DiffractionWarning, match="is damaged"):
-        build.table()
-    assert build.built == 2
-    source._tables.clear()
     build.table()
     assert build.built == 2
 

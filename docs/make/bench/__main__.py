@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from mitsuba_diffraction.cli.console import say_warning
 from mitsuba_diffraction.cli.report import save_json
 from mitsuba_diffraction.errors import DiffractionError
 
-from ..figures.pages import add_measured, exit_code, measured_patch
+from ..figures.pages import measured_options, measured_patch, option, program
 from . import figures, sections
 
 PARTS = (
@@ -31,32 +30,26 @@ PARTS = (
 )  # fmt: skip
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Measure and print, and return the exit code; a missed goal is no failure."""
-    parser = argparse.ArgumentParser(
-        prog="python -m docs.make.bench", description=__doc__.split("\n")[0]
-    )
-    parser.add_argument("--quick", action="store_true", help="fewer, smaller and shorter runs")
-    parser.add_argument("--json", metavar="FILE", type=Path, help="write every single measurement")
-    parser.add_argument(
+@program(
+    option("--quick", action="store_true", help="fewer, smaller and shorter runs"),
+    option("--json", metavar="FILE", type=Path, help="write every single measurement"),
+    option(
         "--against", metavar="FILE", type=Path,
         help="compare with an earlier run, written by --json",
-    )  # fmt: skip
-    parser.add_argument("--only", nargs="+", choices=PARTS, help="measure only these")
-    parser.add_argument(
+    ),
+    option("--only", nargs="+", choices=PARTS, help="measure only these"),
+    option(
         "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
         help="folder of the project's scenes; default: scenes",
-    )  # fmt: skip
-    parser.add_argument(
+    ),
+    option(
         "--progress", action=argparse.BooleanOptionalAction, default=None,
         help="show progress bars; by default on a terminal",
-    )  # fmt: skip
-    add_measured(parser, "height field to measure; default: gratings.elaphe_like")
-    args = parser.parse_args(argv)
-    return exit_code("bench", lambda: _bench(args))
-
-
-def _bench(args: argparse.Namespace) -> None:
+    ),
+    *measured_options("height field to measure; default: gratings.elaphe_like"),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Measure and print; a missed goal is no failure."""
     from tqdm import tqdm
 
     if args.json is not None:

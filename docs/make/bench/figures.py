@@ -19,6 +19,7 @@ class Plan:
     # sides of further patches whose tables are built, with the same size of pixels
     more_pixels: tuple[int, ...] = (4096, 8192)
     other_tables: bool = True  # build `patch` and Taylor tables too
+    scans: int = 62  # of a survey
     lanes: int = 1 << 20  # calls at once
     slow_lanes: int = 1 << 17  # likewise, for the thesis' configuration
     rounds: int = 15  # timed calls of each contender
@@ -34,6 +35,7 @@ FULL = Plan()
 QUICK = Plan(
     more_pixels=(),
     other_tables=False,
+    scans=6,
     lanes=1 << 18,
     slow_lanes=1 << 15,
     rounds=5,

@@ -16,32 +16,31 @@ from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.tables.store import VARIABLE
 
-from .figures import Goal, Plan, Row, Section
+from .figures import FULL, Goal, Plan, Row, Section
 
-#: Scans of a full run, and seconds that they may take on two cores.
-SCANS, MOST = 62, 60.0
+#: Seconds that the scans of a full run may take on two cores.
+MOST = 60.0
 _COLUMNS = ("s", "s a scan", "s of all cores a scan")
 _SIDE, _PIXELS = 10.0, 256  # µm, and pixels a side
 
 
 def measure_survey(plan: Plan, folder: Path, progress: Progress) -> Section:
     """Time `survey` of gratings with roughness, in one process and on two workers."""
-    count = SCANS if plan.other_tables else 6
-    files = [str(file) for file in _scans(folder, count)]
+    files = [str(file) for file in _scans(folder, plan.scans)]
     ways = {"one process": []}
-    if importlib.util.find_spec("distributed") is not None:
+    if plan.scans > 1 and importlib.util.find_spec("distributed") is not None:
         ways["two workers"] = ["--workers", "2"]
     rows = []
     for n, (name, options) in enumerate(ways.items()):
         progress(n, len(ways), f"survey, {name}")
         seconds, busy = _timed(files, folder / name.split()[0], options)
-        goals = [Goal(f"at most {MOST:g} s", seconds <= MOST)] if count == SCANS else []
-        values = seconds, seconds / count, busy / count
+        goals = [Goal(f"at most {MOST:g} s", seconds <= MOST)] if plan.scans == FULL.scans else []
+        values = seconds, seconds / plan.scans, busy / plan.scans
         rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals))
     progress(len(ways), len(ways), "surveyed")
     return Section(
-        f"survey: {count} scans of {_SIDE:g} µm, {_PIXELS}² pixels, each way once, with an empty "
-        "cache and the start of the processes",
+        f"survey: {plan.scans} scans of {_SIDE:g} µm, {_PIXELS}² pixels, each way once, with an "
+        "empty cache and the start of the processes",
         _COLUMNS, rows,
     )  # fmt: skip
 

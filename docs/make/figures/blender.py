@@ -19,10 +19,11 @@ import mitsuba_diffraction as md
 from docs.make.blender.compare import Comparison, compare
 from docs.make.blender.program import run_in_blender, seconds
 from docs.make.blender.views import LIGHTS, Surface, View
-from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.cli import main as run_command
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
+from .pages import option, program
 
 #: Folder of exported surfaces, kept for the next run.
 _FOLDER = Path("out/blender")
@@ -57,7 +58,7 @@ class Example:
         """Export the surface unless it is there."""
         if not list(self.folder.glob("*.osl")):
             words = ["export-osl", self.source, "-o", str(self.folder)]
-            if program(words) != 0:
+            if run_command(words) != 0:
                 raise DiffractionError(f"'{' '.join(words)}' failed; see above")
 
     def surface(self) -> Surface:
@@ -155,37 +156,35 @@ def showcase(target: Path, samples: int) -> None:
     pages.write_jpeg(picture, target, most=_MOST)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Compare, render, write the pictures and the page, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.blender")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
-    parser.add_argument("--quick", action="store_true", help="small and noisy")
-    parser.add_argument("--samples", type=int, default=256, help="of the example's picture; 256")
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(_PARTS)}; all")
-    args = parser.parse_args(argv)
+@program(
+    option("-o", "--output", type=Path, default=Path("docs"), help="of the page"),
+    option("--quick", action="store_true", help="small and noisy"),
+    option("--samples", type=int, default=256, help="of the example's picture; 256"),
+    option("parts", nargs="*", metavar="PART", help=f"{', '.join(_PARTS)}; all"),
+)
+def main(args: argparse.Namespace) -> None:
+    """Compare, render, write the pictures and the page."""
     if unknown := set(args.parts) - set(_PARTS):
-        parser.error(f"unknown part {', '.join(unknown)}; choose from {', '.join(_PARTS)}")
-
-    def work() -> None:
-        mi.set_variant("llvm_ad_rgb")
-        images = args.output / "images/blender"
-        work_folders = [_FOLDER / part for part in _PARTS]
-        for folder in (*work_folders, images):
-            folder.mkdir(parents=True, exist_ok=True)
-        for example in (*EXAMPLES.values(), FOIL):
-            example.export()
-        parts, page = args.parts or _PARTS, args.output / "blender.md"
-        if "differences" in parts:
-            samples = (512, 64) if args.quick else (8192, 768)
-            table, compared = differences(samples, work_folders[0])
-            pages.update(page, {"differences": table})
-            side_by_side(compared, images / "comparison.jpg")
-        if "noise" in parts:
-            pages.update(page, {"noise": noise(work_folders[1])})
-        if "showcase" in parts:
-            showcase(images / "showcase.jpg", 16 if args.quick else args.samples)
-
-    return pages.exit_code("blender", work)
+        raise DiffractionError(
+            f"unknown part {', '.join(unknown)}; choose from {', '.join(_PARTS)}"
+        )
+    mi.set_variant("llvm_ad_rgb")
+    images = args.output / "images/blender"
+    work_folders = [_FOLDER / part for part in _PARTS]
+    for folder in (*work_folders, images):
+        folder.mkdir(parents=True, exist_ok=True)
+    for example in (*EXAMPLES.values(), FOIL):
+        example.export()
+    parts, page = args.parts or _PARTS, args.output / "blender.md"
+    if "differences" in parts:
+        samples = (512, 64) if args.quick else (8192, 768)
+        table, compared = differences(samples, work_folders[0])
+        pages.update(page, {"differences": table})
+        side_by_side(compared, images / "comparison.jpg")
+    if "noise" in parts:
+        pages.update(page, {"noise": noise(work_folders[1])})
+    if "showcase" in parts:
+        showcase(images / "showcase.jpg", 16 if args.quick else args.samples)
 
 
 if __name__ == "__main__":

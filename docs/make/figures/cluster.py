@@ -1,11 +1,9 @@
-"""Figures of docs/cluster.md: a film on two workers beside one process, and simulated clusters.
+"""Figure of docs/cluster.md: a film on two workers beside one process.
 
 python -m docs.make.figures.cluster scenes/plate.xml -o docs/cluster.md
 
 Renders a film of 16 frames five times by turns in one process with two threads and on two workers
-with one; measures what a pass, the client, the scheduler and an addition cost; and simulates jobs
-on clusters of up to 3,000 workers with these costs. All that is measured is processor time, which
-other programs on the machine hardly change.
+with one. Processor time is measured, which other programs on the machine hardly change.
 """
 
 from __future__ import annotations
@@ -15,9 +13,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,32 +21,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mitsuba_diffraction.cluster.frames import FrameRequest, FrameSequence
-from mitsuba_diffraction.cluster.kept import Kept
-from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task, add_sums
 from mitsuba_diffraction.cluster.workers import connect
 from mitsuba_diffraction.errors import warn
-from mitsuba_diffraction.extras import optional
 from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.scene.load import load_scene, set_variant
-from mitsuba_diffraction.scene.passes import (
-    Pass,
-    Span,
-    Stop,
-    render_pass,
-    render_passes,
-    samples_per_pass,
-)
+from mitsuba_diffraction.scene.passes import Stop, render_passes
 
 from . import pages
-from .cluster_simulation import Costs, Job, Simulation
-from .pages import exit_code
+from .pages import option, program
 
 VARIANT, SPP = "llvm_ad_rgb", 32
 FRAMES, RUNS = 16, 5
-WORKERS = (10, 100, 1000, 3000)
-FILM, STILL = Job(2000, 1024, 640, 1024), Job(1, 3840, 2160, 65_536)
-#: Network of every machine, in bytes a second, and the spread of the times of tasks: assumed.
-NETWORK, SPREAD = 1.25e8, 0.15
 
 
 class Times(NamedTuple):
@@ -137,83 +118,6 @@ def film_times(scene: Path) -> FilmTimes:
         return FilmTimes(list(single), list(workers), idle)
 
 
-def processor_seconds(work: Callable[[], Any]) -> float:
-    """Return the processor seconds of a call."""
-    start = time.process_time()
-    work()
-    return time.process_time() - start
-
-
-def costs_of_passes(scene: Path) -> tuple[float, float]:
-    """Return seconds on two cores for a sample, and for the scene and kernels of a frame."""
-    import drjit as dr
-
-    set_variant(None)
-    dr.set_thread_count(2)
-    loaded: list[Any] = []
-    load = processor_seconds(lambda: loaded.append(load_scene(scene, {})))
-    sensor = loaded[0].sensors()[0]
-    pixels = int(np.prod(sensor.film().crop_size()))
-    spp = samples_per_pass(2**30, pixels, "llvm")
-    first, *others = (
-        processor_seconds(partial(render_pass, loaded[0], sensor, Pass(seed, spp)))
-        for seed in range(4)
-    )
-    each = statistics.median(others)
-    return each / 2 / (spp * pixels), load + max(0.0, first - each)
-
-
-def costs_of_sums(count: int = 20) -> tuple[float, float]:
-    """Return seconds of the client and of an addition, for a byte of a sum of the film."""
-    task = Task(SceneFiles("scene", (), ()), "", 0, False, "", 0, Span(0, 1), (), (), 1)
-    raw = np.random.default_rng(0).random((FILM.height, FILM.width, 4), np.float32)
-    sums = Sums(raw, (), (), 1, 0.0, 0)
-    with tempfile.TemporaryDirectory() as folder:
-        store = Kept(Path(folder) / "passes")
-
-        def take() -> None:
-            store.write(task, task.span, sums)
-            stored = store.read(task, task.span)
-            assert stored is not None
-            add_sums([sums, stored])
-
-        client = statistics.median(processor_seconds(take) for _ in range(count))
-    large = [Sums(np.ones(STILL.bytes // 4, np.float32), (), (), 1, 0.0, 0) for _ in range(2)]
-    addition = statistics.median(processor_seconds(lambda: add_sums(large)) for _ in range(5))
-    return client / raw.nbytes, addition / STILL.bytes
-
-
-def scheduler_seconds(count: int = 1000) -> float:
-    """Seconds of client and scheduler, in one process, for an empty task among many."""
-    distributed = optional("distributed")
-    with (
-        distributed.LocalCluster(
-            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None
-        ) as local,
-        distributed.Client(local) as client,
-    ):
-
-        def work() -> None:
-            client.gather([client.submit(abs, n, pure=False) for n in range(count)])
-
-        work()
-        return processor_seconds(work) / count
-
-
-def scaling(costs: Costs) -> str:
-    """The sentence on simulated clusters: their speed relative to the ideal."""
-    parts = []
-    for name, job in (("animation", FILM), ("still", STILL)):
-        shares = [
-            f"{job.work(costs) / workers / Simulation(job, workers, costs).seconds():.0%}"
-            for workers in WORKERS
-        ]
-        hours = job.work(costs) / 3600
-        parts.append(f"{name} {', '.join(shares)} ({hours:.0f} h on one worker)")
-    workers = ", ".join(f"{count:,}" for count in WORKERS)
-    return f"Speed of {workers} workers relative to the ideal: {'; '.join(parts)}."
-
-
 def film_text(times: FilmTimes) -> str:
     """The sentence on a film on two workers."""
     ratios = times.ratios()
@@ -225,47 +129,15 @@ def film_text(times: FilmTimes) -> str:
     )
 
 
-def job_text(job: Job) -> str:
-    """The size of a job."""
-    frames = f"{job.frames:,} frames of " if job.frames > 1 else ""
-    return (
-        f"{frames}{job.width:,} × {job.height:,} pixels at {job.spp:,} samples, a sum of "
-        f"{job.bytes / 1e6:.3g} MB"
-    )
-
-
-def costs_text(costs: Costs) -> str:
-    """Return the assumptions of the simulation, in words."""
-    return (
-        f"Assumed: workers of two cores ({costs.sample * 2**21:.2g} s for a pass of the snake), "
-        f"tasks that vary by {costs.spread:.0%}, {8e-9 / costs.network:g} Gbit/s, no failures. "
-        f"Animation: {job_text(FILM)}. Still: {job_text(STILL)}."
-    )
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, simulate, and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene", type=Path, help="of the film")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/cluster.md"))
-    parser.add_argument(
-        "--simulated", type=Path, default=Path("scenes/snake.xml"),
-        help="scene of the simulated jobs; default: %(default)s",
-    )  # fmt: skip
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        film = film_text(film_times(args.scene))
-        sample, load = costs_of_passes(args.simulated)
-        client, addition = costs_of_sums()
-        costs = Costs(
-            sample, SPREAD, load, scheduler_seconds(), client, addition, 1 / NETWORK
-        )  # fmt: skip
-        parts = {"film": film, "times": costs_text(costs), "scaling": scaling(costs)}
-        print(*parts.values(), sep="\n\n")
-        pages.update(args.output, parts)
-
-    return exit_code("cluster", work)
+@program(
+    option("scene", type=Path, help="of the film"),
+    option("-o", "--output", type=Path, default=Path("docs/cluster.md")),
+)
+def main(args: argparse.Namespace) -> None:
+    """Measure, and write the page."""
+    film = film_text(film_times(args.scene))
+    print(film)
+    pages.update(args.output, {"film": film})
 
 
 if __name__ == "__main__":

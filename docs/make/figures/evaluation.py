@@ -38,7 +38,7 @@ from mitsuba_diffraction.thesis.period_fit import (
 from mitsuba_diffraction.thesis.period_fit.plot import draw
 
 from . import pages
-from .pages import add_measured, exit_code, measured_patch
+from .pages import measured_options, measured_patch, option, program
 
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc")
 
@@ -155,38 +155,34 @@ def period_table(patches: Sequence[Periods]) -> str:
     return pages.table(header, rows)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+@program(
+    option("-o", "--output", type=Path, default=Path("docs/thesis.md")),
+    *measured_options("height field that is evaluated, too"),
+    option("--windows", type=int, default=64),
+    option("--angle-step", type=float, default=0.05, help="degrees"),
+    option("--small", action="store_true", help="gratings only, coarsely: a check"),
+)
+def main(args: argparse.Namespace) -> None:
     """Make the picture and the tables."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.evaluation")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/thesis.md"))
-    add_measured(parser, "height field that is evaluated, too")
-    parser.add_argument("--windows", type=int, default=64)
-    parser.add_argument("--angle-step", type=float, default=0.05, help="degrees")
-    parser.add_argument("--small", action="store_true", help="gratings only, coarsely: a check")
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        patches = exact_gratings()
-        measured = measured_patch(args)
-        if measured is not None:
-            patches.append((measured, None))
-        if not args.small:
-            patches += [(elaphe_like(), None), (xenopeltis_like(), None)]
-        wavelengths = np.arange(380.0, 780.5, 40.0 if args.small else _STEP)
-        angles = np.linspace(-30.0, 75.0, round(105.0 / args.angle_step) + 1)
-        results = []
-        for patch, nominal in patches:
-            print(f"evaluating {patch.name}", flush=True)
-            results.append(
-                evaluate_patch(
-                    patch, nominal, wavelengths=wavelengths, angles=angles, windows=args.windows
-                )
+    patches = exact_gratings()
+    measured = measured_patch(args)
+    if measured is not None:
+        patches.append((measured, None))
+    if not args.small:
+        patches += [(elaphe_like(), None), (xenopeltis_like(), None)]
+    wavelengths = np.arange(380.0, 780.5, 40.0 if args.small else _STEP)
+    angles = np.linspace(-30.0, 75.0, round(105.0 / args.angle_step) + 1)
+    results = []
+    for patch, nominal in patches:
+        print(f"evaluating {patch.name}", flush=True)
+        results.append(
+            evaluate_patch(
+                patch, nominal, wavelengths=wavelengths, angles=angles, windows=args.windows
             )
-        pages.update(args.output, {"periods": period_table(results)})
-        with atomic_path(args.output.parent / "images" / "evaluation.png") as path:
-            evaluation_figure(results).savefig(path, format="png")
-
-    return exit_code("evaluation", work)
+        )
+    pages.update(args.output, {"periods": period_table(results)})
+    with atomic_path(args.output.parent / "images" / "evaluation.png") as path:
+        evaluation_figure(results).savefig(path, format="png")
 
 
 if __name__ == "__main__":

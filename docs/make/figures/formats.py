@@ -8,13 +8,12 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 from mitsuba_diffraction.heights.formats.catalogue import sections
 
 from . import pages
-from .pages import exit_code
+from .pages import option, program
 
 
 def tables() -> str:
@@ -31,12 +30,11 @@ def tables() -> str:
     return re.sub(r"(--[a-z][a-z-]+)", r"`\1`", "\n\n".join(part.strip() for part in parts))
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Write the tables into the page; return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.formats")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
-    page = parser.parse_args(argv).output / "formats.md"
-    return exit_code("formats", lambda: pages.update(page, {"formats": tables()}))
+@program(option("-o", "--output", type=Path, default=Path("docs"), help="of the page"))
+def main(args: argparse.Namespace) -> None:
+    """Write the tables into the page."""
+    page = args.output / "formats.md"
+    pages.update(page, {"formats": tables()})
 
 
 if __name__ == "__main__":

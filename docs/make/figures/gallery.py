@@ -15,17 +15,16 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from mitsuba_diffraction.atomic import atomic_path
-from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.cli import main as run_command
 from mitsuba_diffraction.errors import DiffractionError
 from scenes.make.__main__ import main as meshes
 
 from . import pages
-from .pages import exit_code, write_jpeg
+from .pages import option, program, write_jpeg
 
 FOLDER = Path("images", "gallery")  # beside the pages
 _MOST = 250_000  # bytes of a picture
@@ -227,7 +226,7 @@ def make(picture: Picture, target: Path, scenes: Path) -> None:
                 for word in shlex.split(command.replace("$PWD/", ""))
             ]
             with contextlib.redirect_stdout(io.StringIO()):  # it would name temporary files
-                code = meshes(words[1:]) if words[0] == "meshes" else program(words)
+                code = meshes(words[1:]) if words[0] == "meshes" else run_command(words)
             if code != 0:
                 raise DiffractionError(f"{picture.name}: '{command}' failed; see above")
         rendered = Path(words[-1])
@@ -252,29 +251,25 @@ def _moved(word: str, out: Path, scenes: Path) -> str:
     return word
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Make the pictures and write the pages."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.gallery")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the pages")
-    parser.add_argument("--scenes", type=Path, default=Path("scenes"))
-    parser.add_argument(
+@program(
+    option("-o", "--output", type=Path, default=Path("docs"), help="of the pages"),
+    option("--scenes", type=Path, default=Path("scenes")),
+    option(
         "--only", metavar="NAME", action="append", choices=[p.name for p in PICTURES],
         help="make one picture; may be given several times",
-    )  # fmt: skip
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        (args.output / FOLDER).mkdir(parents=True, exist_ok=True)
-        for picture in PICTURES:
-            if args.only is None or picture.name in args.only:
-                start = time.perf_counter()
-                make(picture, args.output / picture.file, args.scenes)
-                print(f"{picture.name}: {time.perf_counter() - start:.1f} s", flush=True)
-        pages.update(args.output / "gallery.md", {"gallery": markdown("gallery")})
-        parts = {name: markdown(name) for name in ("meshes", "meshes-field")}
-        pages.update(args.output / "meshes.md", parts)
-
-    return exit_code("gallery", work)
+    ),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Make the pictures and write the pages."""
+    (args.output / FOLDER).mkdir(parents=True, exist_ok=True)
+    for picture in PICTURES:
+        if args.only is None or picture.name in args.only:
+            start = time.perf_counter()
+            make(picture, args.output / picture.file, args.scenes)
+            print(f"{picture.name}: {time.perf_counter() - start:.1f} s", flush=True)
+    pages.update(args.output / "gallery.md", {"gallery": markdown("gallery")})
+    parts = {name: markdown(name) for name in ("meshes", "meshes-field")}
+    pages.update(args.output / "meshes.md", parts)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from matplotlib.patches import Arc, Circle
 
 from mitsuba_diffraction.atomic import atomic_path
 
-from .pages import exit_code
+from .pages import option, program
 
 #: Light of the drawing: angle from the normal, degrees; wavelength over period.
 THETA, RATIO = 35.0, 0.34
@@ -109,17 +109,12 @@ def _above(axes: Axes) -> None:
     axes.set_ylim(-1.1, 1.3)
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Draw the picture, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.geometry")
-    parser.add_argument("-o", "--output", metavar="PNG", type=Path, required=True)
-    output: Path = parser.parse_args(argv).output
-
-    def work() -> None:
-        with atomic_path(output) as path:
-            figure().savefig(path, format="png", metadata={"Software": None})
-
-    return exit_code("geometry", work)
+@program(option("-o", "--output", metavar="PNG", type=Path, required=True))
+def main(args: argparse.Namespace) -> None:
+    """Draw the picture."""
+    output: Path = args.output
+    with atomic_path(output) as path:
+        figure().savefig(path, format="png", metadata={"Software": None})
 
 
 if __name__ == "__main__":

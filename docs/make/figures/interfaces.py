@@ -18,6 +18,7 @@ from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.heights.read import OPTIONS
 
 from . import pages
+from .pages import option, program
 
 #: Commands by what they are for, in the order of the page.
 GROUPS = {
@@ -144,17 +145,12 @@ def write_pages(folder: Path) -> Iterator[Path]:
         yield folder / name
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Write the pages, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.interfaces")
-    parser.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs"))
-    folder: Path = parser.parse_args(argv).output
-
-    def work() -> None:
-        for path in write_pages(folder):
-            print(f"wrote {path}")
-
-    return pages.exit_code("interfaces", work)
+@program(option("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs")))
+def main(args: argparse.Namespace) -> None:
+    """Write the pages."""
+    folder: Path = args.output
+    for path in write_pages(folder):
+        print(f"wrote {path}")
 
 
 if __name__ == "__main__":

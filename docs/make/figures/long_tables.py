@@ -14,7 +14,7 @@ from pathlib import Path
 
 from mitsuba_diffraction.atomic import atomic_path
 
-from .pages import exit_code
+from .pages import option, program
 
 #: Rows from which a table is a file.
 LONG = 6
@@ -75,21 +75,13 @@ def _cells(line: str) -> list[str]:
     return [re.sub(r"[`*]", "", cell).replace("\\|", "|").strip() for cell in cells]
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Convert pages, and return the exit code."""
-    parser = argparse.ArgumentParser(
-        prog="python -m docs.make.figures.long_tables", description=__doc__.split("\n")[0]
-    )
-    parser.add_argument("pages", metavar="PAGE", type=Path, nargs="+")
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        for page in args.pages:
-            if separated(text := page.read_text(encoding="utf-8"), page.stem)[1]:
-                for path in write_page(page, text):
-                    print(f"wrote {path}")
-
-    return exit_code("long_tables", work)
+@program(option("pages", metavar="PAGE", type=Path, nargs="+"))
+def main(args: argparse.Namespace) -> None:
+    """Convert pages."""
+    for page in args.pages:
+        if separated(text := page.read_text(encoding="utf-8"), page.stem)[1]:
+            for path in write_page(page, text):
+                print(f"wrote {path}")
 
 
 if __name__ == "__main__":

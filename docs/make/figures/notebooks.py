@@ -11,14 +11,13 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
-from .pages import exit_code
+from .pages import option, program
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -63,30 +62,24 @@ def _environment() -> dict[str, str]:
     return environment
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+@program(
+    option("notebooks", metavar="FILE", type=Path, nargs="*", help="default: all of notebooks"),
+)
+def main(args: argparse.Namespace) -> None:
     """Run notebooks, all of the project by default, and write each one that succeeds."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.notebooks")
-    parser.add_argument(
-        "notebooks", metavar="FILE", type=Path, nargs="*", help="default: all of notebooks"
-    )
-    args = parser.parse_args(argv)
+    paths = args.notebooks or sorted((ROOT / "notebooks").glob("*.ipynb"))
+    if not paths:
+        raise DiffractionError(f"no notebooks in '{ROOT / 'notebooks'}'; name one")
+    for path in paths:
+        print(f"{path}: running", flush=True)
+        start = time.perf_counter()
+        notebook = execute(path)
+        import nbformat  # after `execute` has said what to do without it
 
-    def work() -> None:
-        paths = args.notebooks or sorted((ROOT / "notebooks").glob("*.ipynb"))
-        if not paths:
-            raise DiffractionError(f"no notebooks in '{ROOT / 'notebooks'}'; name one")
-        for path in paths:
-            print(f"{path}: running", flush=True)
-            start = time.perf_counter()
-            notebook = execute(path)
-            import nbformat  # after `execute` has said what to do without it
-
-            with atomic_path(path) as temporary:
-                nbformat.write(notebook, temporary)
-            seconds = time.perf_counter() - start
-            print(f"{path}: {seconds:.1f} s, {path.stat().st_size / 1e3:.0f} kB", flush=True)
-
-    return exit_code("notebooks", work)
+        with atomic_path(path) as temporary:
+            nbformat.write(notebook, temporary)
+        seconds = time.perf_counter() - start
+        print(f"{path}: {seconds:.1f} s, {path.stat().st_size / 1e3:.0f} kB", flush=True)
 
 
 if __name__ == "__main__":

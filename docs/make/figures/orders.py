@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.cli import main as run_command
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import natural
@@ -30,7 +30,7 @@ from mitsuba_diffraction.scene.load import load_scene, set_variant
 from mitsuba_diffraction.scene.pictures import read_exr
 
 from . import pages
-from .pages import exit_code, write_jpeg
+from .pages import option, program, write_jpeg
 
 #: Largest size of a picture, bytes.
 _MOST = 150_000
@@ -167,7 +167,7 @@ def _render(scene: Scene, output: Path, options: Sequence[str]) -> Rendered:
     for few in (["-s", "1"], []):  # the first compiles, and builds tables
         start = time.process_time()
         with contextlib.redirect_stdout(io.StringIO()):
-            if program([*words, *few]) != 0:
+            if run_command([*words, *few]) != 0:
                 raise DiffractionError(f"'{' '.join(words)}' failed; see above")
         seconds = time.process_time() - start
     pixels = _blocks(np.array(read_exr(output))[..., :3])
@@ -196,34 +196,30 @@ def _show(model: Rendered, solved: Rendered, difference: NDArray[np.float64], ta
         write_jpeg(file, target, most=_MOST)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Render, write the pictures and the page, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.orders")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
-    parser.add_argument("--quick", action="store_true", help="small and noisy")
-    parser.add_argument(
-        "--only", choices=[scene.name for scene in SCENES], help="one picture, and not the page"
-    )
-    args = parser.parse_args(argv)
+@program(
+    option("-o", "--output", type=Path, default=Path("docs"), help="of the page"),
+    option("--quick", action="store_true", help="small and noisy"),
+    option(
+        "--only", choices=[scene.name for scene in SCENES], help="one picture, and not the page",
+    ),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Render, write the pictures and the page."""
     images = args.output / "images/orders"
-
-    def work() -> None:
-        rows, shown = [], []
-        with tempfile.TemporaryDirectory() as folder:
-            for scene in SCENES:
-                if args.only in (None, scene.name):
-                    flags = ("resx=90", "resy=70", "spp=8") if args.quick else scene.flags
-                    rows.append(row(scene, images, Path(folder), flags))
-                    print("  ".join(rows[-1]), flush=True)
-                title = scene.title[0].upper() + scene.title[1:]
-                shown.append(f"![{title}: model, solved orders, difference]"
-                             f"(images/orders/{scene.name}.jpg)")  # fmt: skip
-                shown.append(f"{title}. {scene.difference}")
-        if args.only is None:
-            page = "\n\n".join([*shown, pages.table(_HEADER, rows), _HOW.format(_BLOCK)])
-            pages.update(args.output / "orders.md", {"orders": page})
-
-    return exit_code("orders", work)
+    rows, shown = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for scene in SCENES:
+            if args.only in (None, scene.name):
+                flags = ("resx=90", "resy=70", "spp=8") if args.quick else scene.flags
+                rows.append(row(scene, images, Path(folder), flags))
+                print("  ".join(rows[-1]), flush=True)
+            title = scene.title[0].upper() + scene.title[1:]
+            shown.append(f"![{title}: model, solved orders, difference]"
+                         f"(images/orders/{scene.name}.jpg)")  # fmt: skip
+            shown.append(f"{title}. {scene.difference}")
+    if args.only is None:
+        page = "\n\n".join([*shown, pages.table(_HEADER, rows), _HOW.format(_BLOCK)])
+        pages.update(args.output / "orders.md", {"orders": page})
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from PIL import Image
 
@@ -23,6 +23,8 @@ from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 
 Made = TypeVar("Made")
+Option: TypeAlias = tuple[tuple[str, ...], dict[str, Any]]
+Main: TypeAlias = Callable[..., int]
 
 # JPEG's default blurs single sparkling pixels; at 90 they stay, in a quarter of a PNG's size.
 _QUALITIES = (90, 86, 82, 78, 74, 70, 64, 58)
@@ -122,11 +124,42 @@ def write_jpeg(
         raise DiffractionError(f"cannot make '{target}' of '{source}': {error}") from error
 
 
-def add_measured(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare the options that name a measured patch; `what` is the help of the first."""
-    parser.add_argument("--measured", metavar="FILE", help=what)
-    parser.add_argument("--pixel-size", metavar="DX", help="of the measured patch, µm")
-    parser.add_argument("--max-height", metavar="H", help="of the measured patch, µm")
+def option(*names: str, **how: Any) -> Option:
+    """Return an option of a program, as `argparse` declares it."""
+    return names, how
+
+
+def measured_options(what: str) -> tuple[Option, ...]:
+    """Return the options that name a measured patch; `what` is the help of the first."""
+    lengths = (("--pixel-size", "DX"), ("--max-height", "H"))
+    return (
+        option("--measured", metavar="FILE", help=what),
+        *(option(n, metavar=m, help="of the measured patch, µm") for n, m in lengths),
+    )
+
+
+def program(*options: Option) -> Callable[[Callable[[argparse.Namespace], None]], Main]:
+    """Return a decorator that makes a function of parsed options the `main` of its module.
+
+    That returns 0, or 1 after an error, which is printed in one line; its help is the module's.
+    """
+
+    def made(work: Callable[[argparse.Namespace], None]) -> Main:
+        def main(argv: Sequence[str] | None = None) -> int:
+            module = sys.modules[work.__module__]
+            name = module.__spec__.name if module.__spec__ else work.__module__
+            name = name.removesuffix(".__main__")
+            parser = argparse.ArgumentParser(
+                prog=f"python -m {name}", description=str(module.__doc__).split("\n")[0]
+            )
+            for names, how in options:
+                parser.add_argument(*names, **how)
+            args = parser.parse_args(argv)
+            return exit_code(name.rpartition(".")[2], lambda: work(args))
+
+        return main
+
+    return made
 
 
 def measured_patch(args: argparse.Namespace) -> HeightField | None:

@@ -10,7 +10,7 @@ import ast
 import re
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
-from .pages import exit_code
+from .pages import option, program
 
 _FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 #: Modules of the plugins; read, not imported, which would need a variant of Mitsuba.
@@ -141,20 +141,16 @@ def _prose(text: str) -> str:
     return "\n\n".join(shown)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Write the page, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.parameters")
-    parser.add_argument(
+@program(
+    option(
         "-o", "--output", metavar="FILE", type=Path, default=Path("docs/parameters.md"),
         help="page to write; default: docs/parameters.md",
-    )  # fmt: skip
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        with atomic_path(args.output) as temporary:
-            temporary.write_text(page(), encoding="utf-8")
-
-    return exit_code("parameters", work)
+    ),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Write the page."""
+    with atomic_path(args.output) as temporary:
+        temporary.write_text(page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

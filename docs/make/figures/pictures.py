@@ -29,7 +29,7 @@ from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, cd, dvd, elaphe_like, xenopeltis_like
 
-from .pages import add_measured, exit_code, measured_patch, write_jpeg
+from .pages import exit_code, measured_options, measured_patch, write_jpeg
 
 LOOKALIKES = (elaphe_like, xenopeltis_like, cd, dvd)
 LIGHTS = (LightDirection(0.0), LightDirection(45.0, 180.0))
@@ -165,7 +165,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--only", metavar="NAME", action="append", choices=tuple(FIGURES),
         help=f"one of {', '.join(FIGURES)}; may be given several times",
     )  # fmt: skip
-    add_measured(parser, "height field to compare with, drawn first")
+    for names, how in measured_options("height field to compare with, drawn first"):
+        parser.add_argument(*names, **how)
     parser.add_argument("--scenes", metavar="FOLDER", type=Path, default=Path("scenes"))
     parser.add_argument("-s", "--spp", metavar="N", type=int, default=64, help="of renderings")
     args = parser.parse_args(argv)

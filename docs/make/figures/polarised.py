@@ -8,18 +8,17 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.cli import main as run_command
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.orders import OrderTable
 
 from . import pages
-from .pages import exit_code, write_jpeg
+from .pages import option, program, write_jpeg
 
 #: The command of the page.
 COMMAND = (
@@ -63,33 +62,27 @@ def costs(files: dict[str, Path]) -> str:
     return pages.table(("table", "size", "processor seconds", "error, mean"), rows)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Solve, draw, and write the page's part; return the exit code."""
-    parser = argparse.ArgumentParser(prog="polarised", description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="default: docs")
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        picture = args.output / f"images/orders/{_NAME}.jpg"
-        with tempfile.TemporaryDirectory() as name:
-            folder = Path(name)
-            files = {kind: folder / f"{kind}.nc" for kind in ("efficiencies", "Mueller matrices")}
-            for (_, file), option in zip(files.items(), ([], ["--polarised"]), strict=True):
-                if program([*COMMAND, *option, "-o", str(file)]):
-                    raise DiffractionError(f"'{file.name}' cannot be solved; see above")
-            table = OrderTable.load(files["Mueller matrices"])
-            figure(table).savefig(folder / "figure.png", dpi=110)
-            write_jpeg(folder / "figure.png", picture)
-            cost = costs(files)
-        caption = (
-            f"Unpolarised light from {_THETA:g}° on this grating, across the grooves. Left: "
-            "efficiency. Right: degree of polarisation of the order, above 0 along the grooves."
-        )
-        text = f"{caption}\n\n![efficiency and polarisation](images/orders/{_NAME}.jpg)\n\n{cost}"
-        text += "\n\n`python -m docs.make.figures.polarised` makes the figure and the table."
-        pages.update(args.output / "orders.md", {_NAME: text})
-
-    return exit_code("polarised", work)
+@program(option("-o", "--output", type=Path, default=Path("docs"), help="default: docs"))
+def main(args: argparse.Namespace) -> None:
+    """Solve, draw, and write the page's part."""
+    picture = args.output / f"images/orders/{_NAME}.jpg"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        files = {kind: folder / f"{kind}.nc" for kind in ("efficiencies", "Mueller matrices")}
+        for (_, file), option in zip(files.items(), ([], ["--polarised"]), strict=True):
+            if run_command([*COMMAND, *option, "-o", str(file)]):
+                raise DiffractionError(f"'{file.name}' cannot be solved; see above")
+        table = OrderTable.load(files["Mueller matrices"])
+        figure(table).savefig(folder / "figure.png", dpi=110)
+        write_jpeg(folder / "figure.png", picture)
+        cost = costs(files)
+    caption = (
+        f"Unpolarised light from {_THETA:g}° on this grating, across the grooves. Left: "
+        "efficiency. Right: degree of polarisation of the order, above 0 along the grooves."
+    )
+    text = f"{caption}\n\n![efficiency and polarisation](images/orders/{_NAME}.jpg)\n\n{cost}"
+    text += "\n\n`python -m docs.make.figures.polarised` makes the figure and the table."
+    pages.update(args.output / "orders.md", {_NAME: text})
 
 
 if __name__ == "__main__":

@@ -8,38 +8,38 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 from PIL import Image, ImageDraw
 
-from mitsuba_diffraction.cli import main as program
+from mitsuba_diffraction.cli import main as run_command
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.plugin.presets import presets
 
-from .pages import exit_code, write_jpeg
+from .pages import option, program, write_jpeg
 
 PICTURE = Path("images", "presets.jpg")
+_MESH = Path("scenes", "meshes", "knot.ply")
 _COLUMNS, _SIZE, _LABEL = 5, (160, 147), 16
 _MOST = 160_000  # bytes of the picture
 
 
 def draw(folder: Path, samples: int) -> Path:
-    """Render a ball of each preset into a folder; return the picture of all."""
+    """Render a mesh of each preset in the studio of meshes; return the picture of all."""
     width, height = _SIZE
     names = list(presets())
     rows = -(-len(names) // _COLUMNS)
     sheet = Image.new("RGB", (_COLUMNS * width, rows * (height + _LABEL)), "white")
     pen = ImageDraw.Draw(sheet)
     for number, name in enumerate(names):
-        ball = folder / f"{name}.png"
-        command = ["render", "scenes/material_ball.xml", "--preset", name, "-s", str(samples),
+        one = folder / f"{name}.png"
+        command = ["render", str(_MESH), "--preset", name, "-s", str(samples),
                    "-D", f"resx={width}", "-D", f"resy={height}", "--clamp", "20", "--denoise",
-                   "-o", str(ball)]  # fmt: skip
-        if program(command):
-            raise DiffractionError(f"the ball of {name} failed; its message stands above")
+                   "-o", str(one)]  # fmt: skip
+        if run_command(command):
+            raise DiffractionError(f"the picture of {name} failed; its message stands above")
         x, y = number % _COLUMNS * width, number // _COLUMNS * (height + _LABEL)
-        with Image.open(ball.with_stem(f"{name}_denoised")) as picture:
+        with Image.open(one.with_stem(f"{name}_denoised")) as picture:
             sheet.paste(picture.convert("RGB"), (x, y))
         pen.text((x + width / 2, y + height + 2), name, fill="black", anchor="ma")
     written = folder / "presets.png"
@@ -47,19 +47,15 @@ def draw(folder: Path, samples: int) -> Path:
     return written
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Render the balls and write the picture; return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.presets")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the pages")
-    parser.add_argument("-s", "--samples", type=int, default=32, help="per pixel; default: 32")
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        with tempfile.TemporaryDirectory() as folder:
-            picture = draw(Path(folder), args.samples)
-            write_jpeg(picture, args.output / PICTURE, most=_MOST)
-
-    return exit_code("presets", work)
+@program(
+    option("-o", "--output", type=Path, default=Path("docs"), help="of the pages"),
+    option("-s", "--samples", type=int, default=32, help="per pixel; default: 32"),
+)
+def main(args: argparse.Namespace) -> None:
+    """Render the pictures and write them as one."""
+    with tempfile.TemporaryDirectory() as folder:
+        picture = draw(Path(folder), args.samples)
+        write_jpeg(picture, args.output / PICTURE, most=_MOST)
 
 
 if __name__ == "__main__":

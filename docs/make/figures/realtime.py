@@ -16,7 +16,7 @@ from typing import Any
 from mitsuba_diffraction.realtime.shader_comparison.report import plain_number
 
 from . import pages
-from .pages import exit_code, from_json, write_jpeg
+from .pages import from_json, option, program, write_jpeg
 
 PAGE = Path("docs", "realtime.md")
 #: Beside the page; the picture that it shows is that of the default method.
@@ -26,30 +26,24 @@ _OURS = ("fast", "exact")
 _METHOD, _WIDTH = "fast", 1600
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Replace picture and tables, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.realtime")
-    parser.add_argument(
+@program(
+    option(
         "compared", metavar="FOLDER", type=Path, nargs="+",
         help="written by compare; the page shows the first one's sheet, times and textures",
-    )  # fmt: skip
-    parser.add_argument(
+    ),
+    option(
         "--sheet", metavar="FOLDER", type=Path,
         help="a larger picture, of which the sheet is shown; default: the first's",
-    )  # fmt: skip
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, default=Path("docs/realtime.md")
-    )
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        text = _tables([folder / "compare.json" for folder in args.compared])
-        sheet = args.output.parent / SHEET
-        folder = args.sheet or args.compared[0]
-        write_jpeg(folder / f"{_METHOD}.png", sheet, width=_WIDTH)
-        pages.update(args.output, {"realtime": text})
-
-    return exit_code("realtime", work)
+    ),
+    option("-o", "--output", metavar="FILE", type=Path, default=Path("docs/realtime.md")),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Replace picture and tables."""
+    text = _tables([folder / "compare.json" for folder in args.compared])
+    sheet = args.output.parent / SHEET
+    folder = args.sheet or args.compared[0]
+    write_jpeg(folder / f"{_METHOD}.png", sheet, width=_WIDTH)
+    pages.update(args.output, {"realtime": text})
 
 
 def _tables(files: Sequence[Path]) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,7 +22,7 @@ from mitsuba_diffraction.orders.solve.sheet import sheet_efficiencies
 from mitsuba_diffraction.orders.solve.stations import Grating
 
 from . import pages
-from .pages import exit_code
+from .pages import option, program
 
 _INDEX, _WIDTH, _RANGE = 1.58, 65.0, (380.0, 730.0)
 _WAVELENGTHS, _THETAS, _PHIS = (460.0, 610.0), (0.0, 30.0, 60.0), (0.0, 60.0)
@@ -92,19 +91,13 @@ def _heights(profile: Profile) -> HeightField:
     return HeightField(np.tile(heights, (4, 1)), step, periodic=True)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Write the table of the page, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.sheets")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the page")
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        header = ("sinusoidal sheet of index 1.58", *(f"{theta:g}°" for theta in _THETAS))
-        text = pages.table(header, [row(case) for case in CASES])
-        text += "\n\n`python -m docs.make.figures.sheets` makes this table."
-        pages.update(args.output / "orders.md", {"sheets": text})
-
-    return exit_code("sheets", work)
+@program(option("-o", "--output", type=Path, default=Path("docs"), help="of the page"))
+def main(args: argparse.Namespace) -> None:
+    """Write the table of the page."""
+    header = ("sinusoidal sheet of index 1.58", *(f"{theta:g}°" for theta in _THETAS))
+    text = pages.table(header, [row(case) for case in CASES])
+    text += "\n\n`python -m docs.make.figures.sheets` makes this table."
+    pages.update(args.output / "orders.md", {"sheets": text})
 
 
 if __name__ == "__main__":

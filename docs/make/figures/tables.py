@@ -22,7 +22,7 @@ from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import long_tables, pages
-from .pages import exit_code, from_json
+from .pages import from_json, option, program
 
 
 @dataclass(frozen=True)
@@ -280,37 +280,33 @@ PARTS = {
 _LONG = ("tradeoff", "energy")
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Write the tables of one part into its pages, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.tables")
-    parser.add_argument("part", choices=tuple(PARTS))
-    parser.add_argument("measured", metavar="FILE", type=Path, nargs="+", help="JSON, or a folder")
-    parser.add_argument(
+@program(
+    option("part", choices=tuple(PARTS)),
+    option("measured", metavar="FILE", type=Path, nargs="+", help="JSON, or a folder"),
+    option(
         "-o", "--output", metavar="FILE", type=Path, nargs="+",
         help="pages, each with some of the markers; default: those in docs",
-    )  # fmt: skip
-    parser.add_argument("--images", metavar="FOLDER", type=Path, default=Path("docs/images"))
-    args = parser.parse_args(argv)
+    ),
+    option("--images", metavar="FOLDER", type=Path, default=Path("docs/images")),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Write the tables of one part into its pages."""
     part = PARTS[args.part]
-
-    def work() -> None:
-        texts: dict[str, str] = {}
-        for measurement in args.measured:
-            file = measurement / f"{args.part}.json" if part.pictures else measurement
-            parts = from_json(
-                file, partial(part.tables, name=file.stem), writer=part.writer, remedy=part.remedy
-            )
-            for name, text in parts.items():  # a table goes on with the rows of the next file
-                texts[name] = f"{texts[name]}\n{_rows_of(text)}" if name in texts else text
-        for page in args.output or map(Path, part.pages):
-            pages.update_present(page, texts)
-            if args.part in _LONG:
-                long_tables.write_page(Path(page), Path(page).read_text(encoding="utf-8"))
-        for name in part.pictures:
-            with atomic_path(args.images / name) as temporary:
-                shutil.copyfile(args.measured[0] / name, temporary)
-
-    return exit_code(args.part, work)
+    texts: dict[str, str] = {}
+    for measurement in args.measured:
+        file = measurement / f"{args.part}.json" if part.pictures else measurement
+        parts = from_json(
+            file, partial(part.tables, name=file.stem), writer=part.writer, remedy=part.remedy
+        )
+        for name, text in parts.items():  # a table goes on with the rows of the next file
+            texts[name] = f"{texts[name]}\n{_rows_of(text)}" if name in texts else text
+    for page in args.output or map(Path, part.pages):
+        pages.update_present(page, texts)
+        if args.part in _LONG:
+            long_tables.write_page(Path(page), Path(page).read_text(encoding="utf-8"))
+    for name in part.pictures:
+        with atomic_path(args.images / name) as temporary:
+            shutil.copyfile(args.measured[0] / name, temporary)
 
 
 def _rows_of(table: str) -> str:

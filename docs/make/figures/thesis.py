@@ -14,7 +14,7 @@ import argparse
 import math
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,7 +37,7 @@ from mitsuba_diffraction.thesis.sweeps import (
 )
 
 from . import pages
-from .pages import add_measured, exit_code, measured_patch
+from .pages import measured_options, measured_patch, option, program
 
 #: What each method leaves out.
 APPROXIMATES = {
@@ -174,26 +174,24 @@ def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
     pages.update(page, parts)
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Write one of the pages, and return the exit code."""
-    programs = {"methods": write_methods, "sweeps": write_sweeps}
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.thesis")
-    parser.add_argument("page", choices=tuple(programs))
-    parser.add_argument("-o", "--output", type=Path, help="default: that page in docs")
-    add_measured(parser, "scale to take; default: elaphe_like")
-    parser.add_argument("--only", metavar="KIND", action="append", choices=tuple(SWEEPS))
-    parser.add_argument("--resolution", type=int, help="of maps; default: 128, of sweeps 160")
-    parser.add_argument("--small", action="store_true", help="small patches: a check")
-    args = parser.parse_args(argv)
+PROGRAMS = {"methods": write_methods, "sweeps": write_sweeps}
 
-    def work() -> None:
-        patch = measured_patch(args)
-        with warnings.catch_warnings():
-            # how far the model holds is not the question here
-            warnings.simplefilter("ignore", DiffractionWarning)
-            programs[args.page](args, patch)
 
-    return exit_code(args.page, work)
+@program(
+    option("page", choices=tuple(PROGRAMS)),
+    option("-o", "--output", type=Path, help="default: that page in docs"),
+    *measured_options("scale to take; default: elaphe_like"),
+    option("--only", metavar="KIND", action="append", choices=tuple(SWEEPS)),
+    option("--resolution", type=int, help="of maps; default: 128, of sweeps 160"),
+    option("--small", action="store_true", help="small patches: a check"),
+)
+def main(args: argparse.Namespace) -> None:
+    """Write one of the pages."""
+    patch = measured_patch(args)
+    with warnings.catch_warnings():
+        # how far the model holds is not the question here
+        warnings.simplefilter("ignore", DiffractionWarning)
+        PROGRAMS[args.page](args, patch)
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ from mitsuba_diffraction import DiffractionTable, gratings
 from mitsuba_diffraction.tables.build.spectrum import GLOSSY_RADIUS
 
 from . import pages
-from .pages import exit_code
+from .pages import option, program
 
 EXTENT, MADE = 328.0, 2048  # µm and points a side of the look-alike
 #: Coherence windows of 40 µm: the whole scan is eight of them wide, which tables just read.
@@ -107,26 +107,22 @@ def report(whole: Run, windowed: Run, pixels: int) -> str:
     )
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+@program(
+    option("--pixels", type=int, default=16384),
+    option("-o", "--output", type=Path, help="the page; default: print only"),
+    option("--folder", type=Path, help="for files; default: a temporary one"),
+)
+def main(args: argparse.Namespace) -> None:
     """Measure, and write the paragraph between the markers `wide` of a page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pixels", type=int, default=16384)
-    parser.add_argument("-o", "--output", type=Path, help="the page; default: print only")
-    parser.add_argument("--folder", type=Path, help="for files; default: a temporary one")
-    args = parser.parse_args(argv)
-
-    def work() -> None:
-        with tempfile.TemporaryDirectory(dir=args.folder) as folder:
-            scan = Path(folder) / "scan.npy"
-            field(scan, args.pixels)
-            windowed = built(scan, args.pixels)
-            whole = built(scan, args.pixels, ["--periodic", "exact"])
-        text = report(whole, windowed, args.pixels)
-        print(text, json.dumps(agreement(windowed.table, whole.table)), sep="\n")
-        if args.output:
-            pages.update(args.output, {"wide": text})
-
-    return exit_code("wide", work)
+    with tempfile.TemporaryDirectory(dir=args.folder) as folder:
+        scan = Path(folder) / "scan.npy"
+        field(scan, args.pixels)
+        windowed = built(scan, args.pixels)
+        whole = built(scan, args.pixels, ["--periodic", "exact"])
+    text = report(whole, windowed, args.pixels)
+    print(text, json.dumps(agreement(windowed.table, whole.table)), sep="\n")
+    if args.output:
+        pages.update(args.output, {"wide": text})
 
 
 if __name__ == "__main__":

@@ -61,10 +61,8 @@ class PathGain:
         return np.asarray(common * ratio * reached)
 
     def exact(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
-        """Return G at arrays of cosines that broadcast, computed without a table."""
+        """Return G of a material at arrays of cosines that broadcast, computed without a table."""
         common = self.path.common(cos_i, cos_o, cos_turn)
-        if self.path.index is None:
-            return common
         ends = *(np.maximum(c, LEAST_COSINE) for c in (cos_i, cos_o)), np.asarray(cos_turn)
         return common * self._ratio(*ends)
 

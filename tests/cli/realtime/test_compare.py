@@ -7,7 +7,9 @@ from pathlib import Path
 
 import OpenEXR
 import pytest
+from PIL import Image
 
+from docs.make.figures import realtime
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
 
@@ -45,30 +47,16 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_works):
-    ran = run(
-        "compare",
-        scene,
-        "--method",
-        "all",
-        "-s",
-        64,
-        "--full-spp",
-        2,
-        "--supersampling",
-        2,
-        "--frames",
-        8,
-    )
+    ran = run("compare", scene, "--method", "all", "-s", 64, "--full-spp", 2, "--supersampling", 2,
+              "--frames", 8)  # fmt: skip
     assert ran.code == 0, ran
     folder = Path("plate_compare")
     document = json.loads((folder / "compare.json").read_text())
     assert set(document["methods"]) == {"fast", "exact"}
     for method, entry in document["methods"].items():
         assert f"| `{method}` |" in ran.out
-        assert OpenEXR.File(str(folder / f"{method}.exr")).channels()["RGB"].pixels.shape[:2] == (
-            32,
-            40,
-        )
+        channels = OpenEXR.File(str(folder / f"{method}.exr")).channels()
+        assert channels["RGB"].pixels.shape[:2] == (32, 40)
         # a directional light and no more: nothing of it is drawn at random but edges
         assert entry["direct"]["pixels"] == 40 * 32
         noise = document["noise"]["delta_e_mean"] + entry["noise"]["delta_e_mean"]
@@ -84,6 +72,14 @@ def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_w
     assert document["driver"]
     assert (folder / "direct.exr").exists()
     assert (folder / "full.exr").exists()
+    page = Path("docs/realtime.md")
+    (page.parent / realtime.SHEET).parent.mkdir(parents=True)
+    page.write_text("<!-- begin realtime -->\nstale\n<!-- end realtime -->\n", "utf-8")
+    assert realtime.main([str(folder), "-o", str(page)]) == 0
+    found = [f"{entry['direct']['delta_e_mean']:.2f}" for entry in document["methods"].values()]
+    assert f" | {' | '.join(found)} | " in page.read_text("utf-8")
+    with Image.open(page.parent / realtime.SHEET) as image:
+        assert image.width == 1600
 
 
 def test_a_method_that_does_not_suit_is_refused_before_anything_is_rendered(

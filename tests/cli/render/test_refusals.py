@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 
-import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction.cli.main import build_parser
@@ -57,12 +56,11 @@ def test_files_that_are_no_scene_are_one_line(run, scene, content):
 
 
 def test_the_output_is_checked_before_the_scene_is_loaded(run, scene, monkeypatch):
-    monkeypatch.setattr(mi, "load_file", lambda *_, **__: pytest.fail("loaded"))
+    load = "mitsuba_diffraction.cli.render.load_scene"
+    monkeypatch.setattr(load, lambda *_, **__: pytest.fail("loaded"))
     (scene.parent / "a.png").mkdir()
-    assert (
-        "'a.png': it is a folder"
-        in run("render", scene, *QUICK, "-o", "a.exr").failed_in_one_line()
-    )
+    for output, said in (("a.exr", "'a.png': it is a folder"), ("no/a.exr", "write 'no/a.exr'")):
+        assert said in run("render", scene, *QUICK, "-o", output).failed_in_one_line()
 
 
 @posix

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from PIL import Image
 
 from tests.support.room import QUICK, SCENE, pixels, png
 
@@ -186,3 +187,36 @@ def test_doubts_about_a_patch_are_counted_and_info_has_them(run, patch_scene):
     described = json.loads(run(*shlex.split(command), "--json").out)
     assert len(described["warnings"]) == int(number) > 0
     assert sum("coarser than a quarter" in line for line in described["warnings"]) == 1
+
+
+@pytest.mark.parametrize("line", ['<boolean name="second_order" value="true"/>',
+                                  '<string name="layering" value="thesis"/>'])  # fmt: skip
+def test_a_scene_that_names_a_retired_parameter_is_rendered(run, heights, here, line):
+    name = line.split('"')[1]
+    surface = f"""<bsdf type="diffraction">
+      <string name="filename" value="{heights}"/><float name="coherence_width" value="6"/>
+      <float name="pixel_size" value="0.08"/>
+      <boolean name="energy_conserving" value="false"/>%s</bsdf>"""
+    for file, parameter in (("old.xml", line), ("new.xml", "")):
+        text = SCENE.replace('<bsdf type="diffuse"/>', surface % parameter)
+        (here / file).write_text(text, encoding="utf-8")
+        ran = run("render", file, *QUICK, "-s", "1", "-o", file.replace("xml", "exr"))
+        assert ran.code == 0
+        assert ran.err.count(f"{name} is no longer a parameter") == (file == "old.xml")
+    # threads add the samples of a pixel in any order, in single precision
+    np.testing.assert_allclose(pixels("old.exr"), pixels("new.exr"), rtol=1e-5)
+
+
+def test_the_exr_has_a_channel_for_each_receptor_and_the_png_a_legend(run, scene):
+    ran = run(
+        "render", scene, "-m", "scalar_spectral", "-s", "16", "--observer", "dog", "-o", "a.exr"
+    )
+    assert ran.code == 0, ran.err
+    assert "channels s, l" in ran.out
+    channels = OpenEXR.File("a.exr").channels()
+    assert set(channels) == {"s", "l"}
+    # the room's light is white: daylight has less power at 429 nm than at 555 nm
+    short, long = (float(np.mean(channels[name].pixels)) for name in ("s", "l"))
+    assert 0.0 < short < long
+    with Image.open("a.png") as picture:
+        assert picture.width > 400

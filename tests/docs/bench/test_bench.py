@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.make.bench import evaluation, figures, scenes
+from docs.make.bench import evaluation, figures, frames, scenes
 from docs.make.bench.__main__ import main
 from docs.make.bench.figures import Goal, Plan, Row, Section
 from tests.support.directions import rough_patch
@@ -19,18 +19,9 @@ pytestmark = pytest.mark.thorough
 
 # 96 pixels are 4.7 µm, 1/14 of the coherence window: wide taps, but no time to speak of
 TINY = Plan(
-    pixels=96,
-    more_pixels=(),
-    other_tables=False,
-    lanes=64,
-    slow_lanes=32,
-    rounds=2,
-    resolution=12,
-    spp=2,
-    reference_spp=2,
-    map_resolution=8,
-    frame=(12, 8),
-)
+    pixels=96, more_pixels=(), other_tables=False, scans=1, lanes=64, slow_lanes=32, rounds=2,
+    resolution=12, spp=2, reference_spp=2, map_resolution=8, frame=(12, 8),
+)  # fmt: skip
 SCENES = Path(__file__).parents[3] / "scenes"
 
 
@@ -41,6 +32,7 @@ def tiny():
         # as many as the other pictures have: another number is another kernel
         patch.setattr(scenes, "FIREFLY_SPP", TINY.spp)
         patch.setattr(evaluation, "MATERIALS", {"none": evaluation.MATERIALS["none"]})
+        patch.setattr(frames, "_SHORTEST", 1e-4)
         yield
 
 
@@ -57,8 +49,8 @@ def measured(tiny, tmp_path_factory):
 def test_everything_is_measured_and_written(measured):
     file, printed = measured
     parts = (
-        "build", "eval", "sample", "eval_pdf", "pdf", "snake", "noise", "efficiency", "colours",
-        "frames",
+        "build", "survey", "eval", "sample", "eval_pdf", "pdf", "snake", "noise", "efficiency",
+        "colours", "frames",
     )  # fmt: skip
     for part in ("processor", "gathers", *(f"{part}:" for part in parts)):
         assert part in printed

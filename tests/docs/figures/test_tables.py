@@ -25,29 +25,6 @@ def bench(value: float = 2.0, *, met: bool = True) -> dict[str, Any]:
     return {"machine": machine, "sections": sections}
 
 
-def plan() -> dict[str, Any]:
-    """As `plan --json` writes it."""
-    whole = {"memory_mb": 8.5, "terms": "1 x 8"}
-    return {
-        "tables": [
-            {
-                "asked for": {
-                    "frequency (rad/µm)": {"light can probe": 34.9},
-                    "kappa (rad/µm)": {"the table has": 52.4},
-                },
-                "needs": {
-                    "frequency (rad/µm), along x and y": [20.5, 6.5],
-                    "kappa (rad/µm)": 35.0,
-                    "share of the light outside, which is missing": 9e-4,
-                },
-                "whole": whole,
-                "planned": whole | {"memory_mb": 1.0},
-                "times less memory": 8.5,
-            }
-        ],
-    }
-
-
 METAL = {
     "model": "small_slope",
     "albedo": [0.729, 1.409],
@@ -116,13 +93,6 @@ def test_a_graphics_card_stands_beside_the_processor(tmp_path):
     assert "|  | Abacus, 2 cores | by CUDA | Crayon 9 |" in text
     assert "| of aluminium | 5.0 | 5.0 |  |" in text
     assert text.count("80; **missed:** 100") == 2
-
-
-def test_a_plan_has_what_was_measured(tmp_path):
-    text = written(tmp_path, "plan", plan())
-    assert "| table | 8.5 MB | 1 MB |" in text
-    assert "up to 20.5 and 6.5 along x and y" in text
-    assert "8.5 times less memory, and 0.09 % of the light" in text
 
 
 def test_energy_has_rows_of_all_files(tmp_path):

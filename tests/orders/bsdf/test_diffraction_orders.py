@@ -1,39 +1,83 @@
-"""The BSDF `diffraction_orders`: its light is that of the table, however it is asked."""
+"""The BSDF `diffraction_orders`: its light is that of the table, of gratings and of sheets."""
 
 from __future__ import annotations
+
+import itertools
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, reference
+from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.orders import OrderTable
 from tests.support.directions import polar
 from tests.support.furnace import furnace_in
-from tests.support.orders import PERIOD, lit_pairs, load, thin_grating
+from tests.support.orders import (
+    PERIOD,
+    lit_pairs,
+    load,
+    on_all_sides,
+    reference_light,
+    thin_grating,
+)
 from tests.support.variants import evaluate
 
-TABLE = thin_grating()
+TABLE, SHEET = thin_grating(), thin_grating(thin=True)
 
 
-def test_values_are_the_references_and_weights_the_albedo(some_variant):
-    wi, wo, samples, wavelength = lit_pairs(60)
+@pytest.mark.parametrize("table", [TABLE, SHEET], ids=["grating", "sheet"])
+def test_values_are_the_references_and_weights_the_albedo(some_variant, table):
+    wi, wo, samples, wavelength = lit_pairs(80)
     wavelength[:] = wavelength[:, :1]
-    found = evaluate(load(TABLE), wi, wo, samples, wavelength)
+    if table.thin:
+        wi, wo = on_all_sides(wi, wo)
+    found = evaluate(load(table), wi, wo, samples, wavelength)
     values, pdf, again, pdf_again, drawn, _, weights = found
-    expected = reference.orders_brdf(TABLE.efficiency, PERIOD, wi, wo, wavelength[:, 0])
-    expected = expected * wo[:, 2]
+    expected = reference_light(table, wi, wo, wavelength[:, 0])
     # linear interpolation between the corners of cells
     assert np.abs(values[:, 0] - expected).sum() <= 1e-3 * expected.sum()
     assert np.array_equal(values, again)
     assert np.array_equal(pdf, pdf_again)
-    steps = np.arange(-5, 6)[:, None]
-    albedo = TABLE.efficiency(-wi[:, 0], -wi[:, 1], wavelength[:, 0], steps).sum(axis=0)
+    sides, steps = (False, True)[: table.sides], np.arange(-5, 6)[:, None]
+    albedo = sum(
+        np.where(
+            (wi[:, 2] < 0.0) == from_below,
+            table.efficiency(
+                -wi[:, 0], -wi[:, 1], wavelength[:, 0], steps,
+                from_below=from_below, transmitted=transmitted,
+            ).sum(axis=0),
+            0.0,
+        )
+        for from_below, transmitted in itertools.product(sides, sides)
+    )  # fmt: skip
     # drawn exactly: half floats are rounded up
-    far = np.minimum(wi[:, 2], drawn[:, 2]) > 0.2  # where C is 1
+    valid = weights[:, 0] > 0.0
+    assert valid.mean() > 0.9
+    far = valid & (np.minimum(np.abs(wi[:, 2]), np.abs(drawn[:, 2])) > 0.2)  # where C is 1
     assert far.mean() > 0.7
     assert weights[far, 0] == pytest.approx(albedo[far], rel=3e-3)
+    passed = 0.72 if table.thin else 0.0
+    assert (drawn[valid, 2] * wi[valid, 2] < 0.0).mean() == pytest.approx(passed, abs=0.15)
+
+
+@pytest.mark.parametrize("component", [0, 1])
+def test_a_component_of_a_sheet_is_the_light_of_its_side(some_variant, component):
+    wi, wo, samples, wavelength = lit_pairs(40)
+    wi, wo = on_all_sides(wi, wo)
+    whole = evaluate(load(SHEET), wi, wo, samples, wavelength)[0]
+    part = evaluate(load(SHEET), wi, wo, samples, wavelength, component)
+    passed = wi[:, 2] * wo[:, 2] < 0.0
+    assert np.array_equal(part[0], np.where((passed == component)[:, None], whole, 0.0))
+    sides = part[4][:, 2] * wi[:, 2] < 0.0
+    assert np.all(part[5][sides != component] == 0.0)
+
+
+def test_no_bsdf_lies_beneath_a_sheet(some_variant):
+    with pytest.raises(Exception, match="thin sheet") as caught:
+        load(SHEET, beneath={"type": "diffuse"})
+    assert isinstance(caught.value.__cause__ or caught.value, (DiffractionError, RuntimeError))
+    assert mi.has_flag(load(SHEET).flags(), mi.BSDFFlags.GlossyTransmission)
 
 
 def test_a_flat_mirror_keeps_its_light_up_to_the_horizon(some_variant):

@@ -36,8 +36,15 @@ SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.05, polarised=True)
 
 
 @pytest.fixture(scope="module")
-def table():
-    return solve_orders(PROFILE, "none", settings=SETTINGS)
+def announced():
+    """A table, and what was said before it was solved."""
+    estimates = []
+    return solve_orders(PROFILE, "none", settings=SETTINGS, announce=estimates.append), estimates
+
+
+@pytest.fixture(scope="module")
+def table(announced):
+    return announced[0]
 
 
 def test_the_measured_error_is_within_the_tolerance(table):
@@ -71,9 +78,8 @@ def test_a_tolerance_that_lines_say_is_out_of_reach_is_refused_before_the_soluti
     assert stages == ["choosing nodes"]
 
 
-def test_the_size_of_a_table_is_announced_before_it_is_solved():
-    estimates = []
-    made = solve_orders(PROFILE, "Al", settings=SETTINGS, announce=estimates.append)
+def test_the_size_of_a_table_is_announced_before_it_is_solved(announced):
+    made, estimates = announced
     solving = [e for e in estimates if e.stage == "solving"]
     assert solving[-1].size == made.nbytes
     assert solving[0].seconds > 0

@@ -1,57 +1,26 @@
-"""Tables that miss their tolerance; solutions in other processes; the command."""
+"""Solutions in other processes, the command, and the shipped tables."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of, processes, solve_place
 from mitsuba_diffraction.orders.solve.nodes import Place
-from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import sinusoidal
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating
 from tests.support import ROOT
-from tests.support.orders import digest_in_file
 
 pytestmark = pytest.mark.thorough
 pytest.importorskip("gratinglab")
 
 PROFILE, RANGE = sinusoidal(0.5, 0.05), (520.0, 640.0)
 SETTINGS = Settings(RANGE, tolerance=0.1)
-
-
-def test_an_interrupted_table_goes_on_and_is_the_same(tmp_path):
-    class Enough(Exception):
-        pass
-
-    def interrupt(done, total, text):
-        if text == "solving orders" and done == total // 2:
-            raise Enough
-
-    with pytest.raises(Enough):
-        solve_orders(PROFILE, "none", settings=SETTINGS, jobs=Jobs(tmp_path, None, interrupt))
-    table = solve_orders(PROFILE, "none", settings=SETTINGS)
-    first: dict[str, int] = {}
-    again = solve_orders(
-        PROFILE, "none", settings=SETTINGS,
-        jobs=Jobs(tmp_path, None, lambda done, total, text: first.setdefault(text, done)),
-    )  # fmt: skip
-    assert first["solving orders"] > 0
-    assert digest_in_file(again, tmp_path) == digest_in_file(table, tmp_path)
-
-
-def test_a_tolerance_out_of_reach_is_refused_before_the_solution():
-    """The integral method's digits at 48 points end above it, at any number of nodes."""
-    coarse, stages = Settings(wavelengths=RANGE, tolerance=1e-4, resolution=48), []
-    with pytest.raises(md.DiffractionError, match="will not be reached"):
-        solve_orders(PROFILE, "none", settings=coarse, announce=lambda e: stages.append(e.stage))
-    assert "solving" not in stages
 
 
 def test_a_solution_is_the_same_in_this_process_and_another():

@@ -68,12 +68,13 @@ def test_a_file_keeps_it(make, tmp_path):
 
 
 @pytest.mark.parametrize("place", [0.3, 0.6, 0.9])
-def test_a_damaged_file_is_refused(table, tmp_path, place):
+@pytest.mark.parametrize("cut", [False, True])
+def test_a_damaged_file_is_refused(table, tmp_path, place, cut):
     file = tmp_path / "crossed.nc"
     table.save(file)
     content = bytearray(file.read_bytes())
     content[int(place * len(content))] ^= 0x40
-    file.write_bytes(content)
+    file.write_bytes(content[: int(place * len(content))] if cut else content)
     with pytest.raises(DiffractionError, match=r"crossed\.nc"):
         OrderTable.load(file)
 

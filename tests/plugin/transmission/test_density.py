@@ -12,9 +12,9 @@ import pytest
 import mitsuba_diffraction as md
 from tests.support.directions import as_single, polar, rough_patch
 
-#: A random surface; its lobes are 0.04 rad wide, ten cells of the grid below.
+#: A random surface; its lobes are 0.04 rad wide, five cells of the grid below.
 PATCH = rough_patch((66, 56), (0.085, 0.08), 0.08)
-ROWS, COLUMNS, SAMPLES = 700, 1400, 1 << 18
+ROWS, COLUMNS, SAMPLES = 350, 700, 1 << 18
 
 
 class Sides(NamedTuple):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -107,30 +105,6 @@ def test_of_a_component_alone_there_is_that_share_of_the_whole(some_variant, kin
         whole = spectra(bsdf.eval(mi.BSDFContext(), si, vectors(outgoing)))
         assert spectra(bsdf.eval(alone, si, vectors(outgoing))) == pytest.approx(whole)
         assert np.all(spectra(bsdf.eval(other, si, vectors(outgoing))) == 0.0)
-
-
-@pytest.mark.parametrize(
-    ("kind", "name", "at", "step"),
-    [("dielectric", "eta", 1.5, 1e-3), ("sheet", "height_scale", 0.9, 2e-3)],
-)
-def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step):
-    wi, wo, lam = (a[:60] for a in pairs())
-    si, outgoing = interaction(wi, lam), vectors(wo * BELOW)
-    bsdf = both(**SIDES[kind], height_scale=0.9)
-    parameters = mi.traverse(bsdf)
-
-    def values(value: float, differentiable: bool = False) -> Any:
-        parameters[name] = mi.Float(value)
-        if differentiable:
-            dr.enable_grad(parameters[name])
-        parameters.update()
-        return bsdf.eval(mi.BSDFContext(), si, outgoing)
-
-    low, high = (spectra(values(at + s)) for s in (-step, step))
-    value = values(at, differentiable=True)
-    dr.forward(parameters[name])
-    derivative, differences = spectra(dr.grad(value)), (high - low) / (2 * step)
-    assert np.abs(derivative - differences).sum() < 1e-2 * np.abs(differences).sum()
 
 
 def test_a_dictionary_names_an_unknown_plugin():

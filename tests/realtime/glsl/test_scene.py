@@ -1,12 +1,16 @@
-"""Triangles of Mitsuba's shapes."""
+"""Triangles of Mitsuba's shapes, those that a shadow map needs, and distances for marched rays."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 import pytest
 
 from mitsuba_diffraction.realtime.glsl.scene import triangles_of
+from mitsuba_diffraction.realtime.glsl.shadows import Solid, outline
+from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
 
 
 @pytest.mark.parametrize("flipped", [False, True])
@@ -31,3 +35,67 @@ def test_normals_are_mitsubas(some_variant: str, kind: str, flipped: bool) -> No
     assert len(mean) > 0
     assert np.array(found.is_valid()).all()
     assert np.abs(mean - expected).max() < 0.02
+
+
+def solid_of(**shape: Any) -> Solid:
+    found = triangles_of(mi.load_dict(shape))
+    triangles, normals = (x.reshape(-1, 3, 3) for x in (found.positions, found.normals))
+    return Solid.analyse(triangles, normals)
+
+
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_closed_surfaces_are_told_from_open_ones(some_variant: str, mirrored: float) -> None:
+    to_world = mi.ScalarTransform4f().scale([mirrored, 1.0, 1.0])
+    for kind, closed in (("sphere", True), ("cube", True), ("cylinder", False), ("disk", False)):
+        shape = {"type": kind, "to_world": to_world}
+        a, b, c = triangles_of(mi.load_dict(shape)).positions.reshape(-1, 3, 3)[1]
+        turn = np.sign(np.cross(b - a, c - a) @ (a + b + c))  # as seen from outside a convex body
+        assert solid_of(**shape).winding == (turn if closed else 0), kind
+
+
+def test_what_is_more_bent_needs_more_bias(some_variant: str) -> None:
+    flat, smooth = solid_of(type="rectangle").bias, solid_of(type="cylinder").bias
+    assert 0.0 < flat < smooth < 0.1
+    triangle = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
+    bent = np.array([[[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [0.0, 0.0, 1.0]]])
+    assert Solid.analyse(triangle, bent).bias > 0.5
+
+
+def test_an_outline_reaches_as_far_as_what_it_is_of() -> None:
+    places = np.random.default_rng(0).normal(size=(5000, 3))
+    directions = np.random.default_rng(1).normal(size=(3, 200))
+    for some in (places, places * [1.0, 1.0, 0.0], places[:3]):
+        around = outline(some)
+        assert len(around) < 400 or not some[:, 2].any()
+        assert np.allclose((around @ directions).max(axis=0), (some @ directions).max(axis=0))
+
+
+def test_a_ball_and_a_plate_are_as_far_away_as_they_are(some_variant: str) -> None:
+    """Within the cells' diagonal and a step: a triangle lies anywhere in a cell."""
+    ball = mi.load_dict({"type": "sphere", "center": [0.0, 0.0, 1.5], "radius": 1.0})
+    plate = mi.load_dict({"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(2.0)})
+    corners = np.concatenate([triangles_of(shape).positions for shape in (ball, plate)])
+    packed = pack_obstacles(corners.reshape(-1, 3, 3).astype(np.float32))
+    low, cell, size = (packed.uniforms[f"obstacles_{n}"] for n in ("low", "cell", "size"))
+    texels = packed.textures[0].data.ravel()
+    cells = np.random.default_rng(0).integers(0, size, (4000, 3))
+    place = low + cell * (cells + 0.5)
+    to_ball = np.abs(np.linalg.norm(place - [0.0, 0.0, 1.5], axis=1) - 1.0)
+    outside = np.maximum(np.abs(place[:, :2]) - 2.0, 0.0)
+    expected = np.minimum(to_ball, np.hypot(np.linalg.norm(outside, axis=1), place[:, 2])) / cell
+    found = texels[(cells[:, 2] * size[1] + cells[:, 1]) * size[0] + cells[:, 0]] / 4.0
+    near = expected < 60.0  # what a texel can hold
+    assert near.mean() > 0.5
+    assert np.abs(found - expected)[near].max() < 0.5 * 3**0.5 + 0.25
+
+
+def test_no_ray_slips_through_a_large_triangle(some_variant: str) -> None:
+    """Every cell along a line across it is at most a cell from an occupied one."""
+    packed = pack_obstacles(np.array([[[0.0, 0, 0], [1, 0, 0.3], [0.2, 1, 0.7]]]))
+    low, cell, size = (packed.uniforms[f"obstacles_{n}"] for n in ("low", "cell", "size"))
+    texels = packed.textures[0].data.ravel()[: np.prod(size)].reshape(size[::-1])
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), 20000)
+    inside = weights @ [[0.0, 0, 0], [1, 0, 0.3], [0.2, 1, 0.7]]
+    x, y, z = ((inside - low) / cell).astype(int).T
+    assert (texels[z, y, x] == 0).mean() > 0.9
+    assert texels[z, y, x].max() <= 4 * 3**0.5

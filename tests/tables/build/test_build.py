@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.special import jv
 
 from mitsuba_diffraction import DiffractionTable, HeightField, reference
 from mitsuba_diffraction.heights import gratings
@@ -38,40 +37,6 @@ def test_deep_surfaces_take_more_intervals_not_longer_look_ups(coherence):
     assert table.expansion.terms == 8
     assert table.expansion.intervals > 2
     assert max(relative_error(table, DEEP)) <= 1e-3
-
-
-@pytest.mark.parametrize(("coherence", "axis"), [("ensemble", "x"), ("patch", "y")])
-def test_orders_of_gratings_are_the_closed_forms(coherence, axis):
-    period, depth, n = 2.0, 0.2, 64
-    patches = {
-        kind: getattr(gratings, kind)(
-            period, depth, periods=8, pixels_per_period=n, rows=32, axis=axis
-        )
-        for kind in ("sinusoidal", "lamellar", "blazed")
-    }
-    for kind, field in patches.items():
-        table = DiffractionTable.build(
-            field, coherence_width=16.0, tolerance=1e-4, coherence=coherence
-        )
-        for kappa in (3.0, 17.0, 33.0):
-            phase = kappa * depth
-            m = np.arange(-5, 6)
-            q = 2 * np.pi * m / period
-            qx, qy = (q, 0 * q) if axis == "x" else (0 * q, q)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                expected = {
-                    "sinusoidal": jv(m, phase / 2) ** 2,
-                    "lamellar": np.where(
-                        m == 0,
-                        np.cos(phase / 2) ** 2,
-                        m % 2 * 4 * np.sin(phase / 2) ** 2 / (n * np.sin(np.pi * m / n)) ** 2,
-                    ),
-                    "blazed": np.sinc(m - phase / (2 * np.pi)) ** 2,
-                }[kind]
-            power = table.window_sum(qx, qy, kappa)
-            # 1e-4 of all light; sampling a blaze with 64 pixels adds 1/(3·64²) = 8e-5 at one order
-            bound = 1e-4 + (8.2e-5 if kind == "blazed" else 0.0)
-            assert np.abs(power - expected).max() < bound, (kind, kappa)
 
 
 def test_a_flat_patch_is_a_mirror_at_every_kappa():

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.special import jv
 
-from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.tables.build.spectrum import Spectrum
 from tests.support.directions import rough_patch
 
@@ -54,41 +52,3 @@ def test_less_one_keeps_its_digits_where_the_surface_is_almost_flat():
     exact = Spectrum(PATCH, (5, 5), double=True).of_phase(kappa, minus_one=True)
     scale = np.abs(exact).max()
     assert np.abs(orders - exact).max() < SINGLE * scale
-
-
-@pytest.mark.parametrize("kappa", [0.7, 9.0, 33.0])
-def test_a_sinusoid_s_orders_are_bessel_functions(kappa):
-    field = gratings.sinusoidal(2.0, 0.3, periods=5, rows=20)
-    power = np.abs(Spectrum(field, (40, 3)).of_phase(kappa)) ** 2
-    for m in range(-8, 9):
-        expected = jv(m, kappa * 0.15) ** 2
-        assert power[3, 40 + 5 * m] == pytest.approx(expected, abs=SINGLE)
-    power[3, ::5] = 0.0
-    assert power.max() < SINGLE**2  # between the orders, and across, there is nothing
-
-
-@pytest.mark.parametrize("axis", ["x", "y"])
-@pytest.mark.parametrize("kappa", [0.7, 9.0, 33.0])
-def test_a_sampled_lamellar_grating_s_orders(kappa, axis):
-    n, depth = 50, 0.2
-    field = gratings.lamellar(2.0, depth, periods=3, pixels_per_period=n, rows=20, axis=axis)
-    power = np.abs(Spectrum(field, (24, 24)).of_phase(kappa)) ** 2
-    line = power[24] if axis == "x" else power[:, 24]
-    half = kappa * depth / 2
-    for m in range(-7, 8):
-        if m == 0:
-            expected = np.cos(half) ** 2
-        else:
-            expected = (m % 2) * 4 * np.sin(half) ** 2 / (n * np.sin(np.pi * m / n)) ** 2
-        assert line[24 + 3 * m] == pytest.approx(expected, abs=SINGLE)
-
-
-@pytest.mark.parametrize("axis", ["x", "y"])
-def test_a_blazed_grating_sends_its_light_where_its_facets_descend(axis):
-    depth = 0.25
-    field = gratings.blazed(2.0, depth, periods=3, pixels_per_period=64, rows=64, axis=axis)
-    power = np.abs(Spectrum(field, (24, 24)).of_phase(2 * np.pi / depth)) ** 2
-    line = power[24] if axis == "x" else power[:, 24]
-    # order +1 alone, less the steps' (π/64)²/3 = 8e-4
-    assert line[24 + 3] == pytest.approx(1.0, abs=1e-3)
-    assert line[24 - 3] < 1e-6

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,7 @@ from mitsuba_diffraction import DiffractionTable, DiffractionWarning, HeightFiel
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.tables.colour import table as colour_table
-from mitsuba_diffraction.tables.colour.table import ColourTable, cached_colours
-from mitsuba_diffraction.tables.store import VARIABLE
+from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import Array, rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -114,26 +111,3 @@ def test_a_table_too_large_is_coarser_and_says_so(monkeypatch: pytest.MonkeyPatc
     with pytest.warns(DiffractionWarning, match="blurred"):
         colours = ColourTable.build(table)
     assert colours.nbytes <= 4_400_000
-
-
-def test_a_record_gives_back_the_table() -> None:
-    table = DiffractionTable.build(rough_patch((20, 24), (0.3, 0.3), 0.3), coherence_width=5.0)
-    colours = ColourTable.build(table)
-    again = ColourTable.from_record(colours.to_record())
-    assert again.grid == colours.grid
-    assert again.expansion == colours.expansion
-    assert np.array_equal(again.coefficients, colours.coefficients)
-    assert np.array_equal(again.order_0, colours.order_0)
-
-
-def test_a_damaged_file_in_the_cache_is_made_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(VARIABLE, str(tmp_path))
-    table = DiffractionTable.build(rough_patch((20, 24), (0.3, 0.3), 0.2), coherence_width=5.0)
-    first = cached_colours(table)
-    (made,) = tmp_path.glob("colours-*")
-    made.write_bytes(made.read_bytes()[:1000])
-    same = DiffractionTable.build(rough_patch((20, 24), (0.3, 0.3), 0.2), coherence_width=5.0)
-    with pytest.warns(DiffractionWarning, match="is damaged"):
-        assert np.array_equal(cached_colours(same).coefficients, first.coefficients)

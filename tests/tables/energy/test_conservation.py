@@ -7,11 +7,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.gain import PathGain
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar, rough_patch
@@ -77,11 +75,11 @@ def test_an_albedo_under_a_narrow_window_is_the_integral_of_the_model(coherence)
     """Few orders with lobes of some degrees: neither single directions nor a smooth density."""
     patch = rough_patch((40, 40), (0.2, 0.2), 0.12, 1.2)
     table = md.DiffractionTable.build(patch, coherence_width=8.0, coherence=coherence)
-    angles, step = np.array([45.0, 75.0]), np.pi / 480
+    angles, step = np.array([45.0, 75.0]), np.pi / 320
     found, _ = SurfaceEnergy(table, reflector("kirchhoff", None)).albedos(
         Conservation(), np.radians(angles), np.radians([20.0]), 550.0
     )
-    theta, phi = np.meshgrid((np.arange(240) + 0.5) * step, (np.arange(240) + 0.5) * (4 * step))
+    theta, phi = np.meshgrid((np.arange(160) + 0.5) * step, (np.arange(160) + 0.5) * (4 * step))
     wo = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
     weights = np.sin(theta) * np.cos(theta) * 4 * step**2
     exact = [
@@ -152,19 +150,6 @@ def test_coarser_settings_take_less_work_and_are_another_record(tables):
         use_energy_settings(before)
     assert scale is not None
     assert scale.values.shape == (2, 13, 16)
-
-
-@pytest.mark.parametrize("material", MATERIALS)
-def test_the_tabulated_gain_is_the_gain(tables, material):
-    model, index = MATERIALS[material]
-    gain = PathGain(Path(index, model), tables["rough"].roughness, 2 * np.pi / 0.55, 1.0)
-    rng = np.random.default_rng(0)
-    cos_o, turn = rng.uniform(0.05, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)
-    for cos_i in np.cos(np.radians([[0.0], [33.0], [71.0]])):
-        common = gain.path.common(cos_i, cos_o, np.cos(turn))
-        exact = gain.exact(cos_i, cos_o, np.cos(turn)) / common
-        # what an albedo sees of it: linear between 37 angles and 25 azimuths
-        assert np.abs(gain(cos_i, cos_o, turn) / common - exact).mean() < 4e-3 * exact.mean()
 
 
 def test_sums_below_zero_leave_the_scale_a_number():

@@ -12,7 +12,7 @@ from .measurements import Measurements
 
 def write(measured: Measurements) -> str:
     """Write the page."""
-    return "\n\n".join([_hues(6 if measured.quick else 300), _crops(measured.quick)])
+    return "\n\n".join([_hues(2 if measured.quick else 300), _crops(measured.quick)])
 
 
 def _hues(count: int) -> str:
