@@ -93,19 +93,6 @@ def test_tests_import_helpers_and_never_one_another():
     assert not wrong
 
 
-def test_a_tier_is_that_of_a_whole_file():
-    for file in TESTS:
-        tree = parsed(file)
-        marks = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
-        at_top = [
-            ast.unparse(node.value)
-            for node in tree.body
-            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
-        ]
-        once = marks.count("pytest.mark.thorough")
-        assert once == "".join(at_top).count("pytest.mark.thorough") <= 1, file
-
-
 def test_no_test_file_lies_where_pytest_does_not_look(pytestconfig):
     patterns = pytestconfig.getini("norecursedirs")
     for folder in {part for file in TESTS for part in file.relative_to(ROOT).parts[:-1]}:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import functools
 import json
-import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -19,6 +17,7 @@ from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from mitsuba_diffraction.tables.document import parse_document, shape_of, with_coefficients
+from tests.support.damage import mutate
 from tests.support.directions import rough_patch
 from tests.support.instruments import nanoscope
 from tests.support.looked_up import look_up_in_plugin, use_table
@@ -153,26 +152,6 @@ def documents() -> dict[str, str]:
                 document.pop("version")
                 found[name] = json.dumps(document)
         return found
-
-
-def mutate(rng: np.random.Generator, document: Any) -> None:
-    """Replace a value somewhere in nested data, or leave it out."""
-    place = document
-    while True:
-        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
-        key = keys[rng.integers(len(keys))]
-        if not isinstance(place[key], (dict, list)) or not place[key] or rng.random() < 0.15:
-            break
-        place = place[key]
-    if rng.random() < 0.1:
-        del place[key]
-        return
-    old = place[key]
-    numbers = [-1, 0, 1, 2, 3, 1000, 10**12, 0.5, 1e-30, 1e30, 1e300, math.nan, math.inf]
-    words: list[Any] = [None, True, "", "patch", "ensemble", "svd", [], {}, [1, 2], [[1.0]]]
-    if isinstance(old, (int, float)) and not isinstance(old, bool) and rng.random() < 0.7:
-        words = [old * 2, old + 1, -old, old * (1 + 1e-3), *numbers]
-    place[key] = [*words, *numbers][rng.integers(len(words) + len(numbers))]
 
 
 def check_heights(rng: np.random.Generator) -> None:

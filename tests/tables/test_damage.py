@@ -18,8 +18,8 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.files import TABLE_ATTRIBUTE
 from mitsuba_diffraction.tables.exr import CHECKSUM, _checksum
-from tests.fuzz.damage import mutate
 from tests.support import looked_up
+from tests.support.damage import mutate
 from tests.support.directions import rough_patch
 
 #: Tables and files of each kind; `MITSUBA_DIFFRACTION_DAMAGE=10000` for as many as one likes.
