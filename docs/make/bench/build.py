@@ -118,8 +118,16 @@ def _child(*arguments: str) -> str:
 
 
 def child_environment() -> dict[str, str]:
-    """Return the environment of a child that finds the package where this process did."""
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    """Return the environment of a child that finds the package where this process did.
+
+    It has one thread for linear algebra, as commands have.
+    """
+    threads = {"OPENBLAS_NUM_THREADS": "1"}
+    return {
+        **threads,
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+    }
 
 
 def build(heights: str, pixel_size: float, arguments: str) -> None:
