@@ -144,7 +144,7 @@ is lost (docs/validation.md). Renderings use water's index at 589 nm for paths: 
 up to 4 % too dark. `spectrum` uses n(λ).
 
 **Films and stacks.** Scales of energy under a texture of thicknesses from 100 to 600 nm take a
-minute, once; beyond 82° single thicknesses send on up to 1.06 of the light. RGB variants sum the
+minute, once; beyond 82° single thicknesses send on up to 1.09 of the light. RGB variants sum the
 film's colours over wavelengths, apart from the orders. A stack's `spread` is the standard deviation
 of all thicknesses from place to place, as a share: `layers = [["chitin", 0.09], ["1.33", 0.08]]`.
 Stacks exclude a nested BSDF if they absorb. Under a spread, polarised variants keep the mean phase
