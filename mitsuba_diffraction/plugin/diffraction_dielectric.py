@@ -16,7 +16,7 @@ model : string [small_slope]
     `small_slope` or `kirchhoff`, as of `diffraction`.
 energy_conserving : boolean [true]
     Whether s(ωi) s(ωo) scales all light so that R + T = 1. Takes seconds once and is cached, in
-    steps of 0.01 of eta.
+    steps of 0.002 of eta.
 
 The model is that of `diffraction` where light is reflected; light that goes through has orders of
 κ = k (n cosθt − cosθi). Component 0 is the reflection, component 1 the transmission. Orders that

@@ -34,7 +34,7 @@ from .types import Colour, Float, Interaction, Vector3f
 
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
 #: rarely and sees s and the ratio of albedos as constants.
-INDEX_STEP, COAT_STEP, DIELECTRIC_STEP = 0.05, 0.01, 0.01
+INDEX_STEP, COAT_STEP, DIELECTRIC_STEP = 0.05, 0.01, 0.002
 #: Largest change of a film's fringe by rounding its index, rad: at grazing angles light that a film
 #: guides gains several times, within narrow fringes.
 FILM_PHASE = 0.02

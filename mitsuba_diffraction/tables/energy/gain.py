@@ -68,8 +68,13 @@ class PathGain:
 
     @cached_property
     def _table(self) -> Real:
-        """G over `Path.common` at `_nodes`, (polar, polar, AZIMUTHS); finer of a thick film."""
-        polar = 2 * POLAR - 1 if thick(self.path.index) else POLAR
+        """G over `Path.common` at `_nodes`, (polar, polar, AZIMUTHS).
+
+        Finer of a thick film, and where facets reflect totally from some angle on, with a kink.
+        """
+        index = self.path.index
+        fine = thick(index) or (isinstance(index, float) and index < 1.0)
+        polar = 2 * POLAR - 1 if fine else POLAR
         return self._ratio(*_nodes(polar))
 
     def _ratio(self, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
