@@ -135,7 +135,7 @@ def test_the_bound_follows_height_scale():
 def test_kernels_twin_agrees_with_numpy():
     surface = bsdf("sinusoid")
     model = surface.energy
-    found = model._energy.at(1.0).scale
+    found = model._energies[0].at(1.0).scale
     rng = np.random.default_rng(0)
     z, azimuth = rng.uniform(0.02, 1.0, 500), rng.uniform(-np.pi, np.pi, 500)
     sine = np.sqrt(1.0 - z**2)

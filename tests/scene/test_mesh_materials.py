@@ -12,25 +12,8 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.stage import STUDIO
 from mitsuba_diffraction.scene.surfaces import own_id
+from tests.support.boxes import RED, write_boxes
 from tests.support.orders import thin_grating
-
-RED = [0.8, 0.1, 0.1]
-
-
-def write_boxes(file: Path) -> None:
-    """A box `Body` below a smaller red metal one, `Cap`."""
-    trimesh = pytest.importorskip("trimesh")
-    scene = trimesh.Scene()
-    for name, side, height, colour in (("Body", 2.0, 1.0, [1.0] * 4), ("Cap", 1.0, 2.5, [*RED, 1])):
-        box = trimesh.creation.box([side, side, side])
-        box.apply_translation([0.0, height, 0.0])
-        material = trimesh.visual.material.PBRMaterial(
-            name=name, baseColorFactor=colour, metallicFactor=0.75, roughnessFactor=0.25
-        )
-        uv = np.tile([0.25, 0.75], (len(box.vertices), 1))
-        box.visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
-        scene.add_geometry(box, node_name=f"node of {name}")
-    scene.export(file)
 
 
 @pytest.fixture

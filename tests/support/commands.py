@@ -18,6 +18,7 @@ from mitsuba_diffraction.plugin.dictionary import ORDERS
 from mitsuba_diffraction.plugin.presets import PATCHES, find_preset
 from scenes.make.__main__ import main as make_mesh
 from tests.support import crossed
+from tests.support.boxes import write_boxes
 from tests.support.clone import small_clone
 from tests.support.instruments import nanoscope
 from tests.support.logos import drawn, write_board
@@ -166,6 +167,7 @@ def small_tree(folder: Path) -> Path:
     assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
     (folder / "cow.obj").write_text(_WEDGE, "utf-8")
     Image.fromarray(grey).save(folder / "cow.png")
+    write_boxes(folder / "car.glb", "Paint", "Glass")
     mi.Bitmap(np.full((4, 8, 3), 0.4, np.float32)).write(str(folder / "sky.hdr"))
     (folder / "skin-osl").symlink_to("cd-osl")  # which a command before exports
     drawn(32, 1).save(folder / "logo.png")
