@@ -173,7 +173,7 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
 def check_name(name: str) -> None:
     """Refuse a name that a shader cannot have, without its tables.
 
-    Raises a DiffractionError if it is no identifier, or a word of OSL or of a shader's source.
+    Raises a DiffractionError if the name is no identifier, or a word of OSL or of GLSL.
     """
     allowed = "letters, digits and underscores, a letter first"
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):

@@ -93,7 +93,7 @@ class GivenHeights:
     ----------
     name : for `mi.traverse`.
     heights : µm, shape (ny, nx).
-    make : function of heights that returns what is made of them, or refuses them.
+    make : function of heights (ny, nx), µm, that returns their patch, or raises a DiffractionError.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class GivenHeights:
         return np.array(dr.detach(self._values))
 
     def made(self) -> Any:
-        """Return what is made of other heights than before; None of the same."""
+        """Return the patch of heights that changed; None if they did not."""
         numbers = self._numbers()
         if np.array_equal(numbers, self._served):
             return None

@@ -43,7 +43,8 @@ class Budget:
 def recommended(results: Sequence[MeasuredSetting], budget: Budget) -> MeasuredSetting:
     """Return the fastest setting within the tolerance, or without a tolerance the most exact one.
 
-    The smallest of equally fast settings is chosen, among those of coherence `ensemble`.
+    Of equally fast settings the one with the smallest table. Only settings of coherence `ensemble`
+    are candidates.
 
     Raises a DiffractionError if no measured setting stays within the budget.
     """
