@@ -19,6 +19,8 @@ from .types import Buffer, Float, Index, Kind, Mask, Packet
 
 #: Largest number of floats that one packet load fetches.
 PACKET = 16
+#: Bytes of the processors' longest vectors.
+_VECTOR = 64
 
 Table = TypeVar("Table")
 Shared = TypeVar("Shared")
@@ -41,15 +43,30 @@ def once_a_table(make: Callable[[Table], Shared]) -> Callable[[Table], Shared]:
 def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
     """Upload an array into memory of Dr.Jit's own, which starts at a cache line.
 
-    On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, and
-    mistaken for other arrays when a function recorded by `dr.freeze` runs again. Scalar variants
-    have no such arrays: there it stays NumPy's, in single precision for want of `mi.Float16`.
+    On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, read
+    beyond its end by kernels of 16 lanes, and mistaken for other arrays when a function recorded by
+    `dr.freeze` runs again. Scalar variants have no such arrays: there it stays NumPy's, in single
+    precision for want of `mi.Float16`.
     """
     if not dr.is_jit_v(mi.Float):
         return values.astype(np.float32 if kind is mi.Float16 else values.dtype).ravel()
-    array = kind(values.ravel()) * dr.opaque(kind, 1)
+    array = kind(_within(values)) * dr.opaque(kind, 1)
     dr.eval(array)
     return array
+
+
+def tensor(values: NDArray[np.generic]) -> Any:
+    """A `mi.TensorXf` of an array, that may stay in NumPy's memory."""
+    return mi.TensorXf(_within(values.astype(np.float32)).reshape(values.shape))
+
+
+def _within(values: NDArray[np.generic]) -> NDArray[np.generic]:
+    """A copy (n,) in a larger piece of memory: a whole vector of the processor can be read at its
+    end, as Dr.Jit 1.5 does on the CPU with NumPy's memory.
+    """
+    larger = np.zeros(values.size + _VECTOR // values.itemsize, values.dtype)
+    larger[: values.size] = values.ravel()
+    return larger[: values.size]
 
 
 def read(kind: Kind, source: Buffer, index: Index, active: Mask = True) -> Float | Index:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from .memory import tensor
 from .types import Callback, Float
 
 _OURS = __name__.rpartition(".")[0]
@@ -99,7 +100,7 @@ class GivenHeights:
     def __init__(
         self, name: str, heights: NDArray[np.float64], make: Callable[[NDArray[np.float64]], Any]
     ) -> None:
-        self._values, self._loaded = mi.TensorXf(heights), heights
+        self._values, self._loaded = tensor(heights), heights
         self._name, self._make = name, make
         self._first = self._kept = self._served = self._numbers()
 
@@ -129,7 +130,7 @@ class GivenHeights:
 
     def restore(self) -> None:
         """See `Changeable.restore`."""
-        mi.set_property(self._values, mi.TensorXf(self._kept))
+        mi.set_property(self._values, tensor(self._kept))
 
     def keep(self) -> None:
         """See `Changeable.keep`."""

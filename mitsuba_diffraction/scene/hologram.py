@@ -240,7 +240,7 @@ def _enlarged(values: NDArray[np.float64], texels: int) -> Floats:
 
 def _texture(values: Floats) -> dict[str, Any]:
     """Return a bitmap without interpolation: a mean of two gratings would be a wrong grating."""
-    import mitsuba as mi
+    from ..plugin.memory import tensor
 
-    data = mi.TensorXf(np.ascontiguousarray(values))
+    data = tensor(values)
     return {"type": "bitmap", "raw": True, "filter_type": "nearest", "data": data}

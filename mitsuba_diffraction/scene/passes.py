@@ -162,11 +162,13 @@ def developed(scene: Any, sensor: Any, total: NDArray[np.floating[Any]], spp: in
     """Return the picture, a `mi.Bitmap`, of a sum of passes with `spp` samples per pixel in all."""
     import mitsuba as mi
 
+    from ..plugin.memory import tensor
+
     integrator, film = integrator_of(scene), sensor.film()
     if _splats(integrator):
         total = total / spp
     film.prepare(integrator.aov_names())
-    storage: Any = mi.TensorXf(total)
+    storage = tensor(total)
     offset: Any = mi.ScalarPoint2i(film.crop_offset())
     film.put_block(mi.ImageBlock(storage, offset))
     return film.bitmap()

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import quoted
 from ..optics.blend import RoughnessTable
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
-from .expansion import KINDS, Expansion
+from .expansion import KINDS, Expansion, series_sum
 from .fields import check_names, list_of, mapping, number, numbers, pair, require, whole
 from .layout import Grid
 from .store import Record
@@ -249,10 +249,10 @@ def _check_sizes(coefficients: NDArray[Any], expansion: Expansion, scale: float)
     _, ny, nx, components, terms = coefficients.shape
     rows = max(1, _BLOCK // (nx * components * terms))
     for interval, start in itertools.product(range(len(coefficients)), range(0, ny, rows)):
-        weights = expansion.weights(expansion.length * (interval + shares)).T / scale
+        weights = expansion.weights(expansion.length * (interval + shares)) / scale
         part = coefficients[interval, start : start + rows].astype(np.float32)
         with np.errstate(all="ignore"):
-            values = part @ weights.astype(np.float32)
-            powers = values[..., 0, :] if expansion.kind == "power" else (values**2).sum(axis=2)
+            values = series_sum(part, weights.astype(np.float32))
+            powers = values[..., 0] if expansion.kind == "power" else (values**2).sum(axis=-1)
         largest = float(np.abs(powers).max())
         require(largest <= _LARGEST_POWER, f"an order with {largest:.3g} of the light")

@@ -146,6 +146,21 @@ class Expansion:
         return np.where(self.interval(kappa) == 0, (kappa / self.length) ** power, 1.0)
 
 
+def series_sum(
+    coefficients: NDArray[np.floating], weights: NDArray[np.floating]
+) -> NDArray[np.floating]:
+    """Sum the series of bins: coefficients (…, terms) and weights (terms,) give an array (…).
+
+    Weights (n, terms), of several κ, give (n, …).
+    """
+    if weights.ndim == 1:
+        # not BLAS: OpenBLAS 0.3.31 multiplies an unset number into what it then drops, where single
+        # precision has five terms and the processor AVX-512; NumPy warns of it
+        return np.asarray(np.einsum("...t,t->...", coefficients, weights))
+    sums = weights @ coefficients.reshape(-1, coefficients.shape[-1]).T
+    return np.asarray(sums.reshape(len(weights), *coefficients.shape[:-1]))
+
+
 def principal_functions(
     values: NDArray[np.floating],
     expansion: Expansion,

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from .expansion import series_sum
 from .powers import order_0_power
 from .table import DiffractionTable
 from .window import tap_matrix
@@ -181,7 +182,7 @@ class _Powers:
             flat = table.coefficients[interval].reshape(-1, terms)
             self._interval, self._coefficients = interval, flat.astype(np.float32)
         scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
-        parts = (self._coefficients @ scaled).reshape(ny, nx, components)
+        parts = series_sum(self._coefficients, scaled).reshape(ny, nx, components)
         centre = float(order_0_power(table, kappa))
         if table.grid.coherent:
             amplitude = parts[..., 0] + 1j * parts[..., 1]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .expansion import Expansion
+from .expansion import Expansion, series_sum
 from .table import DiffractionTable
 
 
@@ -55,7 +55,7 @@ def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
     """
     interval = int(table.expansion.interval(kappa))
     weights = (table.expansion.weights(kappa) / table.scale).astype(np.float32)
-    parts = table.coefficients[interval].astype(np.float32) @ weights
+    parts = series_sum(table.coefficients[interval].astype(np.float32), weights)
     if table.expansion.kind == "power":
         return np.asarray(parts[..., 0])
     return np.asarray(np.sum(parts**2, axis=-1))

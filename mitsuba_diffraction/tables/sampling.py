@@ -17,6 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from .expansion import series_sum
 from .powers import order_0_power
 from .table import DiffractionTable
 from .window import apply_window
@@ -146,11 +147,11 @@ def _cell_power(
         in_interval = weights[intervals == interval]
         coefficients = table.coefficients[interval].astype(np.float32)
         if expansion.kind == "power":  # linear: the mean of the weights does
-            power = coefficients[:, :, 0] @ in_interval.sum(axis=0).astype(np.float32)
+            power = series_sum(coefficients[:, :, 0], in_interval.sum(axis=0).astype(np.float32))
             total = total + apply_window(matrices, np.maximum(power, 0.0))
             continue
         for weight in in_interval.astype(np.float32):
-            parts = coefficients @ weight
+            parts = series_sum(coefficients, weight)
             if table.grid.coherent:
                 amplitude = parts[..., 0] + 1j * parts[..., 1]
                 total = total + np.abs(apply_window(matrices, amplitude)) ** 2

@@ -1,6 +1,9 @@
-"""Half floats that kernels read as words are the numbers that were stored."""
+"""What kernels read is what was stored, and nothing beside it."""
 
 from __future__ import annotations
+
+import subprocess
+import sys
 
 import drjit as dr
 import mitsuba as mi
@@ -9,6 +12,20 @@ import pytest
 
 from mitsuba_diffraction.plugin.memory import HalfFloats
 
+#: Uploads arrays that end where a page of memory ends that must not be read.
+AT_THE_EDGE = """
+import ctypes, mmap, numpy as np, mitsuba as mi
+mi.set_variant("llvm_ad_spectral")
+from mitsuba_diffraction.plugin.memory import tensor, upload
+page, libc = mmap.PAGESIZE, ctypes.CDLL(None)
+pages = mmap.mmap(-1, 2 * page)
+start = ctypes.addressof(ctypes.c_char.from_buffer(pages))
+assert libc.mprotect(ctypes.c_void_p(start + page), ctypes.c_size_t(page), 0) == 0
+for kind, stored in ((mi.Float, np.float32), (mi.UInt32, np.uint32)):
+    values = np.frombuffer(pages, stored, 17, page - 17 * 4)
+    assert not np.array(upload(kind, values)).any()
+assert not np.array(tensor(values.view(np.float32)) + 0.0).any()
+"""
 #: Least normal half float; smaller ones are read as 0.
 NORMAL = 2.0**-14
 
@@ -32,3 +49,8 @@ def test_inactive_lanes_read_zeros(some_variant: str) -> None:
     far, active = mi.UInt32([1, 1 << 30]), mi.Bool([True, False])
     sums = sum(dr.sum(packet, axis=0) for packet in halves.read(far, active))
     np.testing.assert_array_equal(np.array(sums) * halves.scale, [8.0, 0.0])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="memory is protected by a function of Unix")
+def test_no_memory_beyond_an_array_is_read() -> None:
+    subprocess.run([sys.executable, "-c", AT_THE_EDGE], check=True)

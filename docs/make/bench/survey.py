@@ -70,7 +70,8 @@ def _timed(files: list[str], folder: Path, options: list[str]) -> tuple[float, f
         command, env={**os.environ, VARIABLE: str(folder / "cache")}, capture_output=True, text=True
     )
     if ran.returncode:
-        raise DiffractionError(f"the survey failed: {ran.stderr.strip().splitlines()[-1]}")
+        said = ran.stderr.strip().splitlines() or [f"exit code {ran.returncode}"]
+        raise DiffractionError(f"the survey failed: {said[-1]}")
     after = os.times()
     busy = sum(end - begin for begin, end in zip(before[2:4], after[2:4], strict=True))
     return time.perf_counter() - start, busy

@@ -22,7 +22,7 @@ from ...errors import DiffractionError
 from ...optics.colour import linear_srgb
 from ...plugin.description import Surface, describe
 from ...plugin.directions import Pair, Site
-from ...plugin.memory import upload
+from ...plugin.memory import tensor, upload
 from ...plugin.types import BSDF, Context, Float, Mask, Powers, Spectrum
 from ...tables.source import TableRequest, providing
 from ...tables.table import DiffractionTable
@@ -224,7 +224,7 @@ def _render(scene: Any, sensor: Any, paths: int, seed: int, made: list[_Factors]
     clipped = np.minimum(1.0, np.divide(most, brightness, out=np.ones(lit.shape), where=lit))
     gradient = clipped[..., None] * weights / (clipped * brightness).sum()
     integrator.render_backward(
-        scene, [each.all for each in made], mi.TensorXf(gradient.astype(np.float32)),
+        scene, [each.all for each in made], tensor(gradient),
         sensor=sensor, seed=seed + 1, spp=spp,
     )  # fmt: skip
 

@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..expansion import Expansion
+from ..expansion import Expansion, series_sum
 from ..layout import Grid
 from ..window import apply_window, rows_by_trim, tap_matrix
 from .powers import PatchSpectra
@@ -103,7 +103,7 @@ class ErrorMeter:
         exact = self._exact(kappas.tolist())
         for start in range(0, len(kappas), _TOGETHER):
             few = slice(start, start + _TOGETHER)
-            tables = self._tables(coefficients, weights[few].T / self._real(scale))
+            tables = self._tables(coefficients, weights[few] / self._real(scale))
             for centre, table in zip(centres[few], tables, strict=True):
                 if self.expansion.kind == "power":
                     yield self._compare(next(exact), table[..., 0], centre[0])
@@ -114,13 +114,13 @@ class ErrorMeter:
     def _tables(
         self, coefficients: NDArray[np.floating], weights: NDArray[np.floating]
     ) -> NDArray[np.floating]:
-        """Series (n, ny, nx, components) with weights (terms, n): each coefficient is read once."""
+        """Series (n, ny, nx, components) with weights (n, terms): each coefficient is read once."""
         if coefficients.size < _SMALL:  # threads would take longer to start
-            return np.moveaxis(coefficients.astype(self._real) @ weights, -1, 0)
-        result = np.empty((weights.shape[1], *coefficients.shape[:3]), self._real)
+            return series_sum(coefficients.astype(self._real), weights)
+        result = np.empty((len(weights), *coefficients.shape[:3]), self._real)
 
         def sum_row(y: int) -> None:
-            result[:, y] = np.moveaxis(coefficients[y].astype(self._real) @ weights, -1, 0)
+            result[:, y] = series_sum(coefficients[y].astype(self._real), weights)
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             list(pool.map(sum_row, range(len(coefficients))))

@@ -25,7 +25,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
-from ..expansion import Expansion
+from ..expansion import Expansion, series_sum
 from ..powers import fitted, order_0_power, power_expansion, power_series
 from ..table import DiffractionTable
 from ..window import taps_at
@@ -254,7 +254,7 @@ class OtherOrders:
 
         def powers(kappa: float) -> NDArray[np.float32]:
             weights = (old.weights(kappa) / table.scale).astype(np.float32)
-            amplitude = parts[:, int(old.interval(kappa))] @ weights
+            amplitude = series_sum(parts[:, int(old.interval(kappa))], weights)
             # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
             beats = 2.0 * lobe * (amplitude @ table.order_0_at(kappa))
             return np.asarray((amplitude**2).sum(axis=1) + beats, np.float32)
