@@ -135,8 +135,8 @@ energy: setup  ## measure what energy conservation takes: docs/energy.md
 	@$(PYTHON3) -m docs.make.figures.tables energy $(SURFACES:%=out/energy/%.json)
 
 # scene, width, height, samples of the path tracer, frames, samples a frame along either side of a pixel
-REALTIME := scales:36:24:16200:1024:2 snake:40:25:48600:768:5 xenopeltis:32:20:48400:1536:3 \
-    cd:36:26:24200:1024:3 grating:36:28:24200:1024:3 hologram:36:26:24200:2048:3 material_ball:30:27:24200:1536:3
+REALTIME := scales:36:24:16200:2048:2 snake:40:25:97200:3072:5 xenopeltis:32:20:96100:3072:3 \
+    cd:36:26:48400:1024:3 grating:36:28:48400:1024:3 hologram:36:26:48400:1024:3 material_ball:30:27:48400:3072:3
 # whether what a comparison wrote is no older than the code and the scenes
 UP_TO_DATE = [ -e $(1) ] && [ -z "$$(find mitsuba_diffraction scenes precompute/*.toml Makefile -newer $(1) -type f ! -name '*.pyc' -print -quit)" ]
 realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
