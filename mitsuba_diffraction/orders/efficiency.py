@@ -238,7 +238,7 @@ def _placed(light: _Light) -> _Placed:
     if not table.crossed:
         active &= m_y == 0
     lookup = lookup_of(table)
-    row = lookup.row(-x, -y, np.where(second, -1.0, 1.0) + 0.0 * x, lam)
+    row = lookup.row(-x, -y, np.where(second, -1.0, 1.0) + 0.0 * x, np.maximum(lam, 1.0))
     below = np.full(len(x), second != transmitted) if lookup.sides == 2 else None
     order = (m_x, m_y) if table.crossed else m_x
     return _Placed(lookup, row, order, active, below, y, shape)
