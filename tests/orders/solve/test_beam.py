@@ -42,6 +42,14 @@ def test_light_that_cannot_be_solved_is_refused(options, message):
         solve_orders(sinusoidal(0.6, 0.05), "Al", **options)
 
 
+@pytest.mark.parametrize("material", ["Al", 1.5])
+def test_fewer_harmonics_than_orders_are_refused(material):
+    with pytest.raises(DiffractionError, match="resolution of at least 14"):
+        solve_orders(
+            sinusoidal(8.0, 0.06), material, theta=0.0, settings=replace(GREEN, resolution=12)
+        )
+
+
 def test_efficiencies_of_one_direction_are_those_solved():
     """Also of a few wavelengths, which are narrower than the distance of usual nodes."""
     profile, settings = lamellar(0.376, 0.36, 0.6), Settings((522.0, 542.0))
