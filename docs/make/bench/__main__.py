@@ -90,7 +90,8 @@ def _check_scenes(folder: Path) -> None:
     if not (folder / "snake.xml").is_file():
         raise DiffractionError(
             f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
-            "with --scenes, or measure a part without them: --only build, eval, sample, noise or update"
+            "with --scenes, or measure a part without them: --only build, eval, sample, noise or "
+            "update"
         )
 
 
