@@ -23,7 +23,7 @@ from ..table import OrderTable, check_outline
 from .accuracy import measured_error, powers, warn_of_error
 from .crossed import folded
 from .jobs import LEAST_COSINES, Jobs, Problem
-from .nodes import located
+from .nodes import AnyPlace, located
 from .resolution import resolved
 from .settings import (
     MOST_EXCESS,
@@ -35,7 +35,7 @@ from .settings import (
 )
 from .stations import Complex, Grating, Real
 
-#: Lights of which the resolution is chosen, and solutions at most.
+#: Lights by which the resolution is chosen at most, and solutions at most.
 _COMPARED, _MOST = 5, 100_000
 
 
@@ -90,9 +90,13 @@ def solve_directions(
         y = np.abs(y)
     found = [located(grating, factor * x, factor * y, waves) for factor in factors]
     every = [light.place for of_side in found for light in of_side]
-    compared = every[:: max(len(every) // _COMPARED, 1)]
+    compared = every[:: -(-len(every) // _COMPARED)]
+    ports: dict[AnyPlace, list[int]] = {place: [] for place in every}
+    for came, of_side in enumerate(found):
+        for light in of_side:
+            ports[light.place].append(came * len(light.orders) + light.port)
     announce_comparison(announce, problem, work, compared)
-    chosen = resolved(problem, work, compared, how.tolerance / 2)
+    chosen = resolved(problem, work, compared, how.tolerance / 2, ports)
     ends = np.concatenate([light.orders for of_side in found for light in of_side])
     first, last = ends.min(axis=0), ends.max(axis=0)
     if (steps < 0).any():
