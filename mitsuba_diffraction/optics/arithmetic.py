@@ -64,8 +64,6 @@ class Arithmetic(Protocol):
     index: Callable[[Number], Number]
     flag: Callable[[Mask], Number]
     number: Callable[[Number], Number]
-    #: x without its derivative.
-    constant: Callable[[Number], Number]
     arctan2: Callable[[Number, Number], Number]
 
 
@@ -75,7 +73,7 @@ class _Arrays:
     sqrt, exp, exp2, log2, sin, cos = np.sqrt, np.exp, np.exp2, np.log2, np.sin, np.cos
     floor, absolute, minimum, maximum = np.floor, np.abs, np.minimum, np.maximum
     arcsin, power, arctan2 = np.arcsin, np.power, np.arctan2
-    where, clip, expm1, constant = np.where, np.clip, np.expm1, np.asarray
+    where, clip, expm1 = np.where, np.clip, np.expm1
 
     @staticmethod
     def bounded(x: Number, low: Number, high: Number) -> Number:
@@ -116,7 +114,7 @@ class _Plain:
     arcsin, power = math.asin, pow
     reciprocal, fma, expm1 = _Arrays.reciprocal, _Arrays.fma, math.expm1
     complex, arctan2 = complex, math.atan2
-    index, flag, number, constant = int, int, float, float
+    index, flag, number = int, int, float
 
     @staticmethod
     def bounded(x: float, low: float, high: float) -> float:

@@ -13,6 +13,13 @@ from typing import NamedTuple
 from .arithmetic import Mask, Number, of
 from .coat import transmittances
 
+#: Distance of a coordinate from its ends, 0 and 1, within which it has no derivative.
+_LEAST_T = 1e-10
+#: 2/π arcsin(√t)/√t up to t = ½ by powers of t, the highest first.
+_ARCSINE = (
+    0.0648621943, -0.0359524887, 0.0393108678, 0.0245734976, 0.0480890856, 0.106092051, 0.636619832,
+)  # fmt: skip
+
 
 class OrderCell(NamedTuple):
     """Cell of incident light among a grating's orders.
@@ -53,9 +60,8 @@ def order_cell(
     r, f = xp.clip(k_continuous - band, 0.0, 1.0), p - channel
     # p = K is the end of kind A's last channel, of which rounding makes kind B's
     kind_a = (f < r) | (channel >= band)
-    of_a = f * xp.reciprocal(xp.maximum(r, least))
-    of_b = (f - r) * xp.reciprocal(xp.maximum(1.0 - r, least))
-    t = xp.where(kind_a, of_a, of_b)
+    along, width = xp.where(kind_a, f, f - r), xp.where(kind_a, r, 1.0 - r)
+    t = along * xp.reciprocal(xp.maximum(width, least))
     return OrderCell(c, k_continuous, band, channel, kind_a, t, r)
 
 
@@ -138,22 +144,29 @@ def least_c(index: float) -> float:
 
 
 def smooth_coordinate(t: Number) -> Number:
-    """Return τ of t = sin²(πτ/2), in which square roots at both ends vanish."""
+    """Return τ of t = sin²(πτ/2), in which square roots at both ends vanish, within 1e-7.
+
+    Nearer to an end than τ = 7e-6 it has that value, and no derivative: its slope is infinite.
+    """
     xp = of(t)
-    return xp.arcsin(xp.sqrt(xp.clip(t, 0.0, 1.0))) * (2.0 / math.pi)
+    square = xp.maximum(xp.minimum(t, 1.0 - t), _LEAST_T)
+    fit = _ARCSINE[0]
+    for term in _ARCSINE[1:]:
+        fit = xp.fma(square, fit, term)
+    from_end = xp.sqrt(square) * fit
+    return xp.where(t > 0.5, 1.0 - from_end, from_end)
 
 
 def cell_wavelengths(
-    k_continuous: Number, optical_period: Number, shortest: Number, longest: Number, least_c: Number
+    most: Number, shortest: Number, longest: Number, least_c: Number
 ) -> tuple[Number, Number]:
     """Return the shortest and longest wavelength at which light of some K has a direction.
 
-    optical_period : n d, in the unit of the wavelengths.
+    most : 2nd/K = λ/c, the longest wavelength of all such light.
     shortest, longest : wavelengths of the table.
     least_c : least c of the light, √(1 − 1/n²) of light that comes from outside the medium.
     """
-    xp = of(k_continuous)
-    most = 2.0 * optical_period * xp.reciprocal(xp.maximum(k_continuous, 1e-7))
+    xp = of(most)
     low = xp.clip(shortest, least_c * most, most)
     high = xp.clip(longest, least_c * most, most)
     return low, high

@@ -41,7 +41,6 @@ from numpy.typing import ArrayLike, NDArray
 from ..optics.orders import (
     cell_wavelengths,
     order_cell,
-    smooth_coordinate,
     wavelength_coordinate,
 )
 
@@ -120,7 +119,7 @@ def to_cell(x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, optical_period: f
     channel = np.where(np.abs(x / cell.c) > 1.0, -1, cell.channel).astype(np.int64)
     return Cell(
         cell.band.astype(np.int64), np.where(cell.kind_a, A, B), channel,
-        smooth_coordinate(cell.t), smooth_coordinate(cell.r), cell.k_continuous,
+        _tau(cell.t), _tau(cell.r), cell.k_continuous,
     )  # fmt: skip
 
 
@@ -221,6 +220,11 @@ def sine_squared(tau: ArrayLike) -> Array:
     return np.asarray(np.sin(0.5 * np.pi * np.asarray(tau, np.float64)) ** 2)
 
 
+def _tau(t: Array) -> Array:
+    """Return τ of t = sin²(πτ/2), as exact as `optics.orders.smooth_coordinate` is fast."""
+    return np.asarray(np.arcsin(np.sqrt(np.clip(t, 0.0, 1.0))) * (2.0 / np.pi))
+
+
 def _ends(
     k_continuous: ArrayLike,
     wavelengths: tuple[float, float],
@@ -228,5 +232,5 @@ def _ends(
     least_c: float = 0.0,
 ) -> tuple[Array, Array]:
     """Return the ends of w, nm; least_c : least c of the light."""
-    big_k = np.asarray(k_continuous, np.float64)
-    return cell_wavelengths(big_k, 1e3 * optical_period, *wavelengths, least_c)
+    big_k = np.maximum(np.asarray(k_continuous, np.float64), _MIN_WIDTH)
+    return cell_wavelengths(2e3 * optical_period / big_k, *wavelengths, least_c)

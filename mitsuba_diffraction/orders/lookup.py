@@ -30,8 +30,6 @@ from .table import OrderTable
 
 #: Against division by 0, in single precision.
 _MIN_DIVISOR = 1e-7
-#: Distance of a coordinate from its ends, 0 and 1, from which on it has derivatives.
-_LEAST_T = 1e-6
 #: Half floats round: sums are raised so that no order is left out where one is drawn.
 RAISED = 1.0 + 2.0**-10
 
@@ -163,14 +161,14 @@ class Lookup:
         """
         xp = of(x, wavelength)
         vacuum, wavelength = wavelength, xp.maximum(wavelength, self._ends[0])
-        inverse = self._period * xp.reciprocal(wavelength)
+        inverse = self._period * xp.minimum(xp.reciprocal(vacuum), 1.0 / self._ends[0])
         inside = 1.0 / self.index
         place = order_cell(x * -inside, y * inside, inverse, self._last, _MIN_DIVISOR)
         w = 0.0 * wavelength
         if self._cells.w > 1:
-            ends = cell_wavelengths(place.k_continuous, self._period, *self._ends, self._least_c)
+            ends = cell_wavelengths(wavelength * xp.reciprocal(place.c), *self._ends, self._least_c)
             w = wavelength_coordinate(wavelength, *ends, 1e-3)
-        places = (_smooth(place.t), _smooth(place.r), w)
+        places = (smooth_coordinate(place.t), smooth_coordinate(place.r), w)
         cell, weights = corner_weights(places, self._cells, self._scale)
         band, channel, is_a = xp.index(place.band), xp.index(place.channel), place.kind_a
         channels = band + xp.flag(is_a)
@@ -414,10 +412,3 @@ def weighted(weights: Sequence[Number], corners: Sequence[Number]) -> Number:
     for weight, corner in zip(weights[1:], corners[1:], strict=True):
         value = xp.fma(weight, corner, value)
     return value
-
-
-def _smooth(t: Number) -> Number:
-    """Return `smooth_coordinate`, whose slope at its ends, infinite, is taken as 0."""
-    xp = of(t)
-    within = (t > _LEAST_T) & (t < 1.0 - _LEAST_T)
-    return smooth_coordinate(xp.where(within, t, xp.constant(t)))

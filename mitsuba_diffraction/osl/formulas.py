@@ -44,7 +44,7 @@ def order_formulas() -> str:
     """Return the functions of `optics` that `shaders/orders.osl` calls."""
     program = _program()
     for formula, count in (
-        (order_cell, 5), (smooth_coordinate, 1), (cell_wavelengths, 5), (wavelength_coordinate, 4),
+        (order_cell, 5), (smooth_coordinate, 1), (cell_wavelengths, 4), (wavelength_coordinate, 4),
         (face_transmittance, 2), (passage, 2), (order_direction, 4),
     ):  # fmt: skip
         program.add(formula, *["float"] * count)

@@ -57,7 +57,7 @@ class _Kernel:
     minimum, maximum, clip = staticmethod(minimum), staticmethod(maximum), staticmethod(clip)
     arcsin, power, arctan2 = dr.asin, dr.power, dr.atan2
     is_complex = dr.is_complex_v
-    bounded, constant = staticmethod(index_between), dr.detach
+    bounded = staticmethod(index_between)
     index, number = staticmethod(index_of), staticmethod(float_of)
 
     @staticmethod

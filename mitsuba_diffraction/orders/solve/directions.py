@@ -23,7 +23,7 @@ from ..table import OrderTable, check_outline
 from .accuracy import measured_error, powers, warn_of_error
 from .crossed import folded
 from .jobs import LEAST_COSINES, Jobs, Problem
-from .nodes import located
+from .nodes import AnyPlace, located
 from .resolution import resolved
 from .settings import (
     MOST_EXCESS,
@@ -35,7 +35,7 @@ from .settings import (
 )
 from .stations import Complex, Grating, Real
 
-#: Lights of which the resolution is chosen, and solutions at most.
+#: Lights by which the resolution is chosen at most, and solutions at most.
 _COMPARED, _MOST = 5, 100_000
 
 
@@ -81,9 +81,7 @@ def solve_directions(
     waves, theta = (
         np.repeat(part, azimuth.size) for part in np.meshgrid(lam, polar, indexing="ij")
     )
-    bearings, steps = azimuth, np.ones((azimuth.size, 2), np.int64)
-    if grating.cell is not None:
-        bearings, steps = folded(grating.cell, azimuth)
+    bearings, steps, turns = folded(grating.cell, azimuth)
     phi = bearings[number]
     _refuse_grazing(problem, waves, theta, phi)
     factors = [1.0, 1.0 / block] if block else [1.0] * grating.sides  # side 0 of a block is within
@@ -92,9 +90,13 @@ def solve_directions(
         y = np.abs(y)
     found = [located(grating, factor * x, factor * y, waves) for factor in factors]
     every = [light.place for of_side in found for light in of_side]
-    compared = every[:: max(len(every) // _COMPARED, 1)]
+    compared = every[:: -(-len(every) // _COMPARED)]
+    ports: dict[AnyPlace, list[int]] = {place: [] for place in every}
+    for came, of_side in enumerate(found):
+        for light in of_side:
+            ports[light.place].append(came * len(light.orders) + light.port)
     announce_comparison(announce, problem, work, compared)
-    chosen = resolved(problem, work, compared, how.tolerance / 2)
+    chosen = resolved(problem, work, compared, how.tolerance / 2, ports)
     ends = np.concatenate([light.orders for of_side in found for light in of_side])
     first, last = ends.min(axis=0), ends.max(axis=0)
     if (steps < 0).any():
@@ -104,6 +106,7 @@ def solve_directions(
     if grating.thin and (np.abs(y) > 1e-9).any():
         elements = 1  # without phases, which tell s from p
     values = np.full((len(waves), grating.sides, grating.sides, len(orders), elements), np.nan)
+    jones = np.full((*values.shape[:-1], 4), np.nan, np.complex128) if how.polarised else None
     announce_stage(announce, "solving", chosen.problem, work, every, 4.0 * values.size)
     solved = work.amplitudes(chosen.problem, every, "solving orders")
     for came, of_side in enumerate(found):
@@ -114,10 +117,16 @@ def solve_directions(
             places = (light.orders * step - first) @ [1, int(last[0] - first[0]) + 1]
             for left in range(grating.sides):
                 values[n, came, left, places] = rows[left * size : (left + 1) * size]
+            if jones is not None:  # no sheet or block
+                matrices = solved[light.place][0, light.port].transpose(1, 2, 0).reshape(size, 4)
+                phase = np.exp(2j * np.pi * (light.orders @ turns[number[n]]))
+                odd = np.array([1, step.prod(), step.prod(), 1])
+                jones[n, 0, 0, places] = matrices * odd * phase[:, None]
     header = header_of(chosen, how) | dict(facts)
     if not lights.is_all:
         header["directions"] = [[float(t), float(p)] for t in polar for p in azimuth]
-    table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]))
+    matrices = None if jones is None else jones.reshape(*shape, *jones.shape[1:])
+    table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]), matrices)
     made = listed_table(
         table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
     )  # fmt: skip

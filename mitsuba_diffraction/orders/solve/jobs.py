@@ -28,7 +28,7 @@ from .crossed import CrossedWaves
 from .integral import IntegralSolver
 from .nodes import AnyPlace, CrossedPlace
 from .sheet import sheet_efficiencies
-from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, on_both_sides
+from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, Station, on_both_sides
 
 Spot = TypeVar("Spot", bound=AnyPlace)
 
@@ -160,7 +160,7 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     Values are rounded as they are stored, so that a table is the same whether or not it was
     interrupted.
 
-    Raises a DiffractionError if the solver fails on the profile.
+    Raises a DiffractionError if the solver fails on the profile, or has too few harmonics.
     """
     solver = solver_of(problem)
     start, grating = time.thread_time(), problem.grating
@@ -171,6 +171,8 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
         w = place.w[:1] if grating.is_perfect else place.w
         least = LEAST_COSINES.get(problem.method, LEAST_COSINE)
         station = grating.station(place.band, place.kind, place.tau, place.rho, w, least)
+        if problem.method in LAYERED:
+            _check_harmonics(problem, station)
     try:
         values = solver.amplitudes(station)
     except DiffractionError:
@@ -186,6 +188,17 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     if grating.block:
         values = on_both_sides(values, station)
     return Solved(values.astype(np.complex64), time.thread_time() - start)
+
+
+def _check_harmonics(problem: Problem, station: Station) -> None:
+    """Refuse a resolution whose harmonics are fewer than the orders that propagate."""
+    middle = station.channels // 2
+    numbers = np.append(station.inside, [0, station.channels - 1]) - middle
+    if (needed := int(np.abs(numbers).max())) > problem.resolution:
+        raise DiffractionError(
+            f"{problem.grating.profile.name} at resolution {problem.resolution}: more orders "
+            f"propagate; use a resolution of at least {needed}, or leave it out"
+        )
 
 
 @dataclass

@@ -38,7 +38,7 @@ from ...shading.programs import Program
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
 _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "ORDERS": {
-        order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 5, wavelength_coordinate: 4,
+        order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 4, wavelength_coordinate: 4,
         order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4, horizon_correction: 3,
     },
     "FACE": {face_transmittance: 2, passage: 2, order_direction: 4},

@@ -50,8 +50,7 @@ void find_row(float wavelength)
     int k = int(band);
     int first = k * (k + 1) * (2 * k + 1) / 3 + (kind_a ? 0 : (k + 1) * (k + 2));
     row_tile = first + int(row_channel) * int(row_channels + 1.0);
-    cell_wavelengths(orders, optical_period, solved_range.x, solved_range.y, least_c, shortest,
-                     longest);
+    cell_wavelengths(wavelength / c, solved_range.x, solved_range.y, least_c, shortest, longest);
     row_place = vec3(smooth_coordinate(t), smooth_coordinate(r),
                      wavelength_coordinate(wavelength, shortest, longest, 1e-6));
 }
