@@ -20,7 +20,7 @@ from ..optics.orders import crossed_square
 from .cells import Array as Real
 from .efficiency import jones_matrices
 from .listed import mirror_of
-from .lists import AXES, CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
+from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, axes_of, check_light
 from .polarised import MIN_ANGLE
 from .response import ListedResponse, orders_between
 from .table import OrderTable
@@ -58,8 +58,7 @@ class Listing(NamedTuple):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a CSV, whose numbers have 7 digits, or NetCDF (.nc), as `lists` has them.
 
-        Raises a DiffractionError if the file cannot be written, or NetCDF is asked for of a crossed
-        grating; no half-written file is left.
+        Raises a DiffractionError if the file cannot be written; no half-written file is left.
         """
         if Path(path).suffix == ".nc":
             self._save_netcdf(Path(path))
@@ -70,22 +69,21 @@ class Listing(NamedTuple):
 
     def _save_netcdf(self, path: Path) -> None:
         """Write the numbers over wavelength, theta, phi and order; NaN where none propagates."""
-        if PAIR[0] in self.columns:
-            raise DiffractionError(f"{path}: orders of a crossed grating are written as CSV (.csv)")
+        names = axes_of(self.columns)
+        lights, numbers = self.rows.T[: len(names)], self.rows.T[len(names) :]
         axes, places = zip(
-            *(np.unique(column, return_inverse=True) for column in self.rows.T[:4]), strict=True
+            *(np.unique(column, return_inverse=True) for column in lights), strict=True
         )
         with atomic_path(path) as temporary, netcdf_file(str(temporary), "w") as file:
-            for name, unit, along in zip(
-                AXES, ("nm", "degrees", "degrees", "1"), axes, strict=True
-            ):
+            units = "nm", "degrees", "degrees", "1", "1"
+            for name, unit, along in zip(names, units, axes, strict=False):
                 file.createDimension(name, len(along))
                 variable = file.createVariable(name, "d", (name,))
                 variable[:], variable.units = along, unit
-            for name, column in zip(self.columns[4:], self.rows.T[4:], strict=True):
+            for name, column in zip(self.columns[len(names) :], numbers, strict=True):
                 values = np.full([len(along) for along in axes], np.nan)
                 values[places] = column
-                variable = file.createVariable(name, "d", AXES)
+                variable = file.createVariable(name, "d", names)
                 variable[:], variable.units = values, "1"
 
 

@@ -24,10 +24,12 @@ WAVENUMBER = 2e3 * np.pi / WAVELENGTH
 SETTINGS = Settings((WAVELENGTH, WAVELENGTH), polarised=True, resolution=12)
 
 
-def solved(profile, material, theta, phi, resolution=12):
+def solved(profile, material, theta, phi, resolution=12, method="auto", **more):
     """Jones matrices by order of one light."""
-    settings = Settings((WAVELENGTH, WAVELENGTH), polarised=True, resolution=resolution)
-    table = solve_orders(profile, material, theta=theta, phi=phi, settings=settings)
+    settings = Settings(
+        (WAVELENGTH, WAVELENGTH), method=method, polarised=True, resolution=resolution
+    )
+    table = solve_orders(profile, material, theta=theta, phi=phi, settings=settings, **more)
     return listed(table, WAVELENGTH, theta, phi)
 
 
@@ -54,6 +56,26 @@ def test_a_raised_mirror_has_fresnel_s_amplitudes_and_the_phase_of_its_way(walls
     expected = np.diag(coefficients) * np.exp(-2j * WAVENUMBER * height * cosine)
     found = solved(polygon(steps, 0.6) if walls else smooth, "Al", *light)
     # steps of 10⁻⁴ nm; the light 10⁻⁴° from the normal that stands for it
+    np.testing.assert_allclose(found[0,], expected, atol=5e-6)
+
+
+@pytest.mark.parametrize("method", ["chandezon", "coupled"])
+def test_a_film_has_airy_s_amplitudes_at_the_level_of_the_metal(method):
+    """(r₁ + r₂E)/(1 + r₁r₂E), E = exp(2ik n t cosθ'); its upper face is t nearer to the light."""
+    thickness, film = 0.083, 1.46
+    cosine = np.cos(np.radians(40.0))
+    within = np.sqrt(1.0 - (1.0 - cosine**2) / film**2)
+    metal = material_of("Al", SETTINGS.wavelengths).index(WAVELENGTH)
+    faces = zip(fresnel(cosine, film), fresnel(within, metal / film), strict=True)
+    through = np.exp(2j * WAVENUMBER * film * thickness * within)
+    airy = [(first + last * through) / (1.0 + first * last * through) for first, last in faces]
+    steps = [(0.0, 0.0), (0.3, 0.0), (0.3, -1e-7), (0.6, -1e-7)]
+    u = np.arange(64) / 64
+    smooth = Profile(0.6 * u, 1e-7 * np.cos(2 * np.pi * u), 0.6)
+    profile = polygon(steps, 0.6) if method == "coupled" else smooth
+    found = solved(profile, "Al", 40.0, 60.0, method=method, layers=[(str(film), thickness)])
+    expected = np.diag(airy) * np.exp(-2j * WAVENUMBER * thickness * cosine)
+    # steps of 10⁻⁴ nm
     np.testing.assert_allclose(found[0,], expected, atol=5e-6)
 
 

@@ -124,11 +124,17 @@ def test_lists_have_the_lines_of_the_csv(opened, tmp_path):
             assert np.isfinite(file[name][:]).sum() == len(lines)
 
 
-def test_the_library_s_own_files_are_imported(tmp_path):
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+@pytest.mark.parametrize("grooves", [True, False])
+def test_the_library_s_own_files_are_imported(grooves, tmp_path):
     """NetCDF 4, compressed, as the library writes it by default."""
     pytest.importorskip("h5py")
-    listing = list_orders(thin_grating(0.6, counts=(2, 2, 1)), [500.0, 550.0], [0.0, 40.0])
+    if grooves:
+        listing = list_orders(thin_grating(0.6, counts=(2, 2, 1)), [500.0, 550.0], [0.0, 40.0])
+    else:
+        listing = list_orders(crossed.table(), [500.0, 550.0], [0.0, 40.0], np.arange(0, 360, 60))
     listing.save(tmp_path / "classic.nc")
+    listing.save(tmp_path / "lines.csv")
     with (
         netCDF4.Dataset(tmp_path / "classic.nc") as old,
         netCDF4.Dataset(tmp_path / "new.nc", "w") as new,
@@ -138,5 +144,16 @@ def test_the_library_s_own_files_are_imported(tmp_path):
         for name, variable in old.variables.items():
             made = new.createVariable(name, "f8", variable.dimensions, zlib=True)
             made.units, made[:] = variable.units, variable[:]
-    tables = [md.read_orders(tmp_path / f"{name}.nc", 0.6) for name in ("classic", "new")]
-    assert tables[0].digest() == tables[1].digest()
+    period = 0.6 if grooves else crossed.PERIODS
+    lines, old, new = (
+        md.read_orders(tmp_path / name, period) for name in ("lines.csv", "classic.nc", "new.nc")
+    )
+    assert old.digest() == new.digest()
+    for order in (0, 1) if grooves else ((0, 0), (1, -1)):
+        shares = [
+            table.efficiency(-math.sin(math.radians(40.0)), 0.0, 550.0, *np.atleast_1d(order))
+            for table in (lines, new)
+        ]
+        assert shares[0] > 0.0
+        # the CSV has seven digits
+        assert shares[1] == pytest.approx(shares[0], rel=1e-6)
