@@ -40,8 +40,9 @@ METHODS: dict[str, Callable[..., Solver]] = {
 #: Method of crossed gratings, the only one.
 CROSSED = "crossed"
 LAYERED = ("coupled", "chandezon")
-#: Least |cosine| of any order across the grooves (`stations.LEAST_COSINE`) of the solvers that lose
-#: digits as 1/cosine: 1.7° from grazing, where diffuse light has 1e-3 of its power.
+#: Least |cosine| of any order across the grooves (`stations.LEAST_COSINE`) in tables of all light,
+#: by solvers that lose digits as 1/cosine: 1.7° from grazing, where diffuse light has 1e-3 of its
+#: power. Listed light has the resolution that it needs there.
 LEAST_COSINES = {"integral": 0.03}
 #: Choice of the solver by the grating, see `method_for`.
 AUTO = "auto"
@@ -55,6 +56,8 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 class Problem:
     """Grating, solver and its resolution; `digest` identifies the grating and the solver.
 
+    Light nearer to grazing than `least_cosine` has the efficiencies there (`stations`).
+
     Raises a DiffractionError if the resolution is above `MOST_RESOLUTION`.
     """
 
@@ -62,6 +65,7 @@ class Problem:
     method: str
     resolution: int
     digest: str
+    least_cosine: float = LEAST_COSINE
 
     def __post_init__(self) -> None:
         if self.resolution > MOST_RESOLUTION[self.method]:
@@ -117,7 +121,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
         structure.lengths,
         *(part for medium in structure.materials for part in (medium.wavelengths, medium.values)),
     )  # fmt: skip
-    return Problem(grating, method, resolution, digest)
+    return Problem(grating, method, resolution, digest, LEAST_COSINES.get(method, LEAST_COSINE))
 
 
 def digest_of(*parts: object) -> str:
@@ -169,8 +173,9 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
         station = grating.crossed_station(place.x, place.y, place.w[0])
     else:
         w = place.w[:1] if grating.is_perfect else place.w
-        least = LEAST_COSINES.get(problem.method, LEAST_COSINE)
-        station = grating.station(place.band, place.kind, place.tau, place.rho, w, least)
+        station = grating.station(
+            place.band, place.kind, place.tau, place.rho, w, problem.least_cosine
+        )
         if problem.method in LAYERED:
             _check_harmonics(problem, station)
     try:
@@ -286,7 +291,7 @@ class Jobs:
 
 def _names(problem: Problem, places: Iterable[Spot]) -> dict[Spot, str]:
     """Return the names of the solutions of places."""
-    outline = problem.digest, problem.resolution
+    outline = problem.digest, problem.resolution, problem.least_cosine
     return {place: digest_of((*outline, tuple(place)))[:24] for place in places}
 
 

@@ -188,7 +188,8 @@ def coarsest(problem: Problem) -> int:
     dense = np.maximum(grating.superstrate, 0.0 if index is None else np.abs(index))
     waves = float((1e3 * dense / lam).max())  # per µm
     if problem.method in ("coupled", "chandezon"):
-        per_period = grating.superstrate * 1e3 / low
+        # a sheet's orders within its material count, too
+        per_period = waves if grating.thin else grating.superstrate * 1e3 / low
         least = int(np.ceil(profile.period * per_period)) + _HARMONICS
         if problem.method == "coupled":
             return least

@@ -11,8 +11,10 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve.jobs import problem_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, polygon, sinusoidal
+from mitsuba_diffraction.orders.solve.resolution import coarsest
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.sheet import sheet_efficiencies
 from mitsuba_diffraction.orders.solve.stations import Grating, reversed_light
@@ -145,3 +147,12 @@ def test_what_is_no_clear_sheet_is_refused_in_one_line(arguments, message):
     with pytest.raises(DiffractionError, match=message) as caught:
         md.solve_orders(WALLS, thin=True, **arguments)
     assert "\n" not in str(caught.value)
+
+
+def test_the_first_resolution_has_the_orders_within_the_material():
+    """73 of them, and 19 outside."""
+    profile = lamellar(5.0, 0.1)
+    surface = Grating(profile, material_of(4.0, (550.0, 550.0)), 1.0, (550.0, 550.0), thin=True)
+    light = surface.station(17, 0, 0.3, 0.5, [0.5])
+    waves = CoupledWaves(profile, coarsest(problem_of(surface, "coupled", 0)))
+    assert np.allclose((np.abs(waves.amplitudes(light)) ** 2).sum(axis=(3, 4)), 1.0, atol=1e-6)
