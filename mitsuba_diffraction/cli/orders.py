@@ -33,7 +33,8 @@ from .report import Figures, output_of
             ("--polarised", "shares of s and of p light; default: both are the share of "
              "unpolarised light", bool),
             ("--jones", "Jones matrices about s and p, of a table of 'solve --polarised', for ray "
-             "tracers; J_ss is real", bool),
+             "tracers, with the phase of the order at light of 'solve --theta'; elsewhere J_ss is "
+             "real, and has_phase 0", bool),
         )),
     ), "Values, or FIRST:LAST:STEP, several joined by commas."),
     options.json("the lines"),
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace) -> Figures:
     import numpy as np
 
     from ..orders.file import load_orders
-    from ..orders.listing import list_orders
+    from ..orders.listing import WITH_PHASE, list_orders
 
     output = output_of(args, Path(f"{args.table.stem}.csv"))
     table = load_orders(args.table)
@@ -56,7 +57,11 @@ def run(args: argparse.Namespace) -> Figures:
     listing.save(output)
     rows = listing.rows
     light = "s and p" if args.polarised else "unpolarised light"
-    light = "Jones matrices" if args.jones else light
+    if args.jones:
+        known = int(rows[:, listing.columns.index(WITH_PHASE)].sum())
+        light = f"Jones matrices, {known} with the phase of their order"
+        if known < len(rows):
+            light += " (solve --polarised --theta --phi --step has it at the light that it lists)"
     print(
         f"{args.table} -> {output}: {len(rows)} lines, {len(np.unique(rows[:, 0]))} wavelengths, "
         f"{len(np.unique(rows[:, 1:3], axis=0))} directions, {listing.orders}, {light}"

@@ -144,8 +144,8 @@ def load_by_plan(
         else:
             say(
                 f"plan: {names} has a table of {table.table.nbytes / 1e6:.3g} MB instead of "
-                f"{before:.3g} MB; {100 * table.outside:.2g} % of the surface's light lies beyond "
-                "it, and is missing"
+                f"{before:.3g} MB; at most {100 * table.outside:.2g} % of the surface's light lies "
+                "beyond it, and is missing"
             )
     return load_limited(load, planned)
 

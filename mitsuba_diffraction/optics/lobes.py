@@ -31,12 +31,11 @@ def lobe_means(width: float, radius: Real) -> LobeMeans:
     """
     cosine = np.sqrt(np.maximum(1.0 - radius**2, 1e-12))
     places, at_horizon = _lobes(width)
-    whole = LobeMeans(np.ones_like(radius), cosine, 1.0 / cosine)
-    means = (
-        np.where(radius > places[0], np.interp(radius, places, cut), mean)
-        for mean, cut in zip(whole, at_horizon, strict=True)
-    )
-    return LobeMeans(*means)
+    means = LobeMeans(np.ones_like(radius), cosine, 1.0 / cosine)
+    below = radius > places[0]
+    for mean, cut in zip(means, at_horizon, strict=True):
+        mean[below] = np.interp(radius[below], places, cut)
+    return means
 
 
 @lru_cache(maxsize=64)

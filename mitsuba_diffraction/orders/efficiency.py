@@ -13,6 +13,7 @@ from ..errors import DiffractionError, warn
 from ..reference.boundary import mueller as mueller_matrices
 from .cells import Array
 from .grid import OrderGrid, grid_of
+from .listed import listed_jones
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
 from .polarised import IN_PLANE, TurnedAxes, nearest_jones, s_and_p, turned_axes
@@ -142,18 +143,34 @@ def mueller(table: OrderTable, *light: Any) -> Array:
     return mueller_matrices(_jones(_Light(table, *light)))
 
 
+class JonesMatrices(NamedTuple):
+    """Jones matrices (…, 2, 2), and whether the table has their common phase (…)."""
+
+    matrices: NDArray[np.complex128]
+    with_phase: NDArray[np.bool_]
+
+
 def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
-    """Return the Jones matrices of an order about s and p, (…, 2, 2), as ray tracers take them.
+    """Return `jones_matrices` alone."""
+    return jones_matrices(table, *light).matrices
+
+
+def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
+    """Return the Jones matrices of an order about s and p, as ray tracers take them.
 
     E_leaving = J E_incident times the root of the ratio of cosines: |J|² are shares of the light.
-    s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d (`polarised.s_and_p`). Tables
-    lack the common phase of an order, which depends on where the grooves lie: J_ss is real, or
-    J_pp where there is no J_ss. Arguments as for `efficiency`.
+    s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d (`polarised.s_and_p`). Time
+    is exp(−iωt), and fields are those at the profile's origin; of crossed gratings it is the first
+    of the heights, at their lowest level. Light that was solved itself, at one of the listed
+    directions and wavelengths, has its phases; of other light J_ss is real, or J_pp where there is
+    no J_ss. Arguments as for `efficiency`.
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
     at = _Light(table, *light)
-    of_grooves = _jones(at)
+    exact = listed_jones(*at[:6])
+    with_phase = np.isfinite(exact[..., 0, 0])
+    of_grooves = np.where(with_phase[..., None, None], exact, _jones(at))
     x, y, lam, m_x, m_y = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in at[1:6]))
     steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
     shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
@@ -165,8 +182,8 @@ def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     found = s_and_p(of_grooves, towards, away)
     size = np.abs(found[..., 0, 0])
     reference = np.where(size > 1e-9, found[..., 0, 0], found[..., 1, 1])
-    phase = np.exp(-1j * np.angle(reference))
-    return np.asarray(found * phase[..., None, None])
+    phase = np.where(with_phase, 1.0, np.exp(-1j * np.angle(reference)))
+    return JonesMatrices(np.asarray(found * phase[..., None, None]), with_phase)
 
 
 def _jones(light: _Light) -> NDArray[np.complex128]:

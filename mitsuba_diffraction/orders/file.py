@@ -5,7 +5,8 @@ first is the efficiency. Over cells, the variable `kind_a_K` holds kind A of ban
 dimensions `tau_K`, `rho_K`, `w_K`, `j_a_K`, `q_a_K` and `element` of `Band.a`; `kind_b_K` holds
 kind B. Of listed light, `efficiency` has the dimensions `wavelength`, `theta`, `phi`, `side`,
 `port` and `element` of `ListedResponse.values`, with coordinate variables `wavelength` (nm, in
-vacuum), `theta` and `phi` (degrees), and `order_x` and `order_y` of the ports of a side.
+vacuum), `theta` and `phi` (degrees), and `order_x` and `order_y` of the ports of a side; solved
+polarised light has `phase`, radians, over all of them but `element`.
 
 Global attributes hold the rest: `period` (µm), `period_y` (of a crossed grating; else left out),
 `wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose `j` and `q` are
@@ -42,7 +43,7 @@ from .table import OrderTable
 FORMAT_VERSION = 2
 SUFFIX = ".nc"
 _AGAIN = "solve it again with the command 'solve', or import its efficiencies again"
-_LISTED = "efficiency"
+_LISTED, _PHASES = "efficiency", "phase"
 
 
 def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
@@ -92,6 +93,8 @@ def _add_response(file: Any, table: OrderTable) -> None:
             _add(file, name, ("order",), column.astype(">i4"))
         every = ("wavelength", "theta", "phi", "side", "port", "element")
         _add(file, _LISTED, every, response.values.astype(">f4"))
+        if response.phases is not None:
+            _add(file, _PHASES, every[:-1], response.phases.astype(">f4"), "radian")
         return
     if response.even:
         file.even = np.int32(1)
@@ -169,6 +172,7 @@ def _table(file: Any) -> OrderTable:
             (axes[0], axes[1], axes[2]), np.column_stack(orders), _floats(file, _LISTED),
             bool(getattr(file, "in_plane", False)),
             float(file.index) if hasattr(file, "index") else None,
+            _floats(file, _PHASES) if _PHASES in file.variables else None,
         )  # fmt: skip
     else:
         response = CellResponse(_bands(file), even=bool(getattr(file, "even", False)))

@@ -10,13 +10,19 @@ from scipy.spatial import KDTree
 
 from ..errors import warn
 from .cells import Array
+from .polarised import nearest_jones
 from .response import ListedResponse, orders_between
 from .table import OrderTable
+
+Complex = NDArray[np.complex128]
 
 #: Decimals of degrees that tell directions apart.
 _DIGITS = 9
 #: Widest gap between azimuths of a crossed grating, degrees, that needs no warning.
 _WIDEST_GAP = 90.0
+#: Differences of directions (twice `polarised.MIN_ANGLE`), and relative ones of wavelengths, within
+#: which light is the listed one.
+_SAME, _SAME_WAVELENGTH = 4e-6, 1e-6
 
 
 class Lights(NamedTuple):
@@ -29,6 +35,8 @@ class Lights(NamedTuple):
     orders : (m, 2), m_x and m_y.
     values : (a, b, c, sides in, sides out, m, n) elements of Mueller matrices, as of
         `ListedResponse.values`; NaN where an order does not propagate.
+    jones : (a, b, c, sides in, sides out, m, 4) Jones matrices of all 16 elements, times any
+        positive number: their phases are stored; None where phases are not known.
     """
 
     wavelengths: Array
@@ -36,6 +44,7 @@ class Lights(NamedTuple):
     phi: Array
     orders: NDArray[np.int64]
     values: Array
+    jones: Complex | None = None
 
 
 def mirror_of(theta: ArrayLike, phi: ArrayLike) -> tuple[Array, Array]:
@@ -71,13 +80,16 @@ def listed_response(
     orders = orders_between(first.tolist(), last.tolist())
     width = last[0] - first[0] + 1
     places = (lights.orders[:, 1] - first[1]) * width + lights.orders[:, 0] - first[0]
-    a, b, c, came, left, _, n = lights.values.shape
+    content = lights.values
+    if lights.jones is not None:
+        content = np.concatenate([content, lights.jones.view(np.float64)], axis=-1)
+    a, b, c, came, left, _, n = content.shape
     # directions (θ, φ) of the list at nodes of the grid; several at one node are mirror images
     sums = np.zeros((a, len(polar), len(azimuths), came, left, len(orders), n))
     found = np.zeros((len(polar), len(azimuths)), np.int64)
     spread = np.zeros((a, b, c, came, left, len(orders), n))
     spread[:] = np.nan
-    spread[..., places, :] = lights.values
+    spread[..., places, :] = content
     for i, j in np.ndindex(b, c):
         row = int(np.searchsorted(polar, theta[i, j]))
         columns: Any = slice(None)
@@ -88,6 +100,8 @@ def listed_response(
         sums[:, row, columns] += value if isinstance(columns, int) else value[:, None]
     values = sums / np.maximum(found, 1)[:, :, None, None, None, None]
     values = _of_nearest_directions(values, found > 0, polar, azimuths)
+    n = lights.values.shape[-1]
+    values[:, found == 0, ..., n:] = np.nan
     if crossed:  # a circle: nodes beyond 0 and 360°
         azimuths = np.concatenate([azimuths[-1:] - 360.0, azimuths, azimuths[:1] + 360.0])
         values = np.concatenate([values[:, :, -1:], values, values[:, :, :1]], axis=2)
@@ -95,12 +109,69 @@ def listed_response(
     optical = [1e-3 / (period * (1.0 if block else superstrate)) for period in periods]
     axes = np.asarray(lights.wavelengths, np.float64), polar, azimuths
     stored = np.empty((*values.shape[:4], left * len(orders), n), np.float32)
+    values, matrices = values[..., :n], np.ascontiguousarray(values[..., n:])
     for side in range(came):
         factor = index if block and side == 0 else 1.0
         light = values[:, :, :, side].reshape(*values.shape[:3], left * len(orders), n)
         stored[:, :, :, side] = _filled(light, axes, np.tile(orders, (left, 1)), optical, factor)
     in_plane = not crossed and bool(np.isin(azimuths, (0.0, 180.0)).all())
-    return ListedResponse(axes, orders, stored, in_plane)
+    phases = None
+    if lights.jones is not None:
+        phases = _phases(stored, matrices.view(np.complex128).reshape(*stored.shape[:-1], 4))
+    return ListedResponse(axes, orders, stored, in_plane, phases=phases)
+
+
+def _phases(elements: NDArray[np.float32], matrices: Complex) -> NDArray[np.float32]:
+    """Return phases (…) of Jones matrices (…, 4) against those of `_pure`; NaN of NaN."""
+    phases = np.angle((_pure(elements).conj() * matrices).sum(axis=-1))
+    return np.where(np.isnan(phases), np.float32(np.nan), phases.astype(np.float32))
+
+
+def _pure(elements: NDArray[np.float32]) -> Complex:
+    """Return Jones matrices (…, 4) of elements, whose largest entry is real and positive.
+
+    Sums of single precision in double precision are exact, so that which one is the largest is the
+    same where phases are made and where they are read.
+    """
+    parts = list(np.moveaxis(elements.astype(np.float64), -1, 0))
+    entries = np.stack(nearest_jones(parts), axis=-1)
+    return np.asarray(np.sqrt(elements[..., :1]) * entries, np.complex128)
+
+
+def listed_jones(table: OrderTable, *light: ArrayLike) -> Complex:
+    """Return Jones matrices (…, 2, 2) about the axes of `polarised`, with their phases.
+
+    NaN of light that the table does not list, or has no phases of.
+
+    light : x, y, wavelength and order, order_y, as for `efficiency.efficiency`.
+    """
+    x, y, lam, m_x, m_y = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in light))
+    response = table.response
+    if not isinstance(response, ListedResponse) or response.phases is None:
+        return np.full((*x.shape, 2, 2), np.nan, np.complex128)
+    z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    along = y if table.crossed else -np.abs(y)
+    theta, phi = np.arctan2(np.hypot(x, y), z), np.arctan2(-along, -x) % (2.0 * np.pi)
+    values = lam, np.degrees(theta), np.degrees(phi)
+    nodes = [
+        np.searchsorted(0.5 * (axis[1:] + axis[:-1]), value)
+        for axis, value in zip(response.axes, values, strict=True)
+    ]
+    wave, polar, azimuth = (axis[n] for axis, n in zip(response.axes, nodes, strict=True))
+    there = *mirror_of(polar, azimuth), np.cos(np.radians(polar))
+    known = np.abs(wave - lam) <= _SAME_WAVELENGTH * lam
+    for part, listed in zip((x, along, z), there, strict=True):
+        known &= np.abs(part - listed) <= _SAME
+    first, last = response.orders[0], response.orders[-1]
+    for m, low, high in zip((m_x, m_y), first, last, strict=True):
+        known &= (m >= low) & (m <= high)
+    port = (m_y - first[1]) * (last[0] - first[0] + 1) + m_x - first[0]
+    place = (*nodes, 0, np.where(known, port, 0).astype(np.int64))
+    phases = np.where(known, response.phases[place], np.nan)
+    entries = _pure(response.values[place]) * np.exp(1j * phases)[..., None]
+    if not table.crossed:  # of the mirror image, J_ef and J_fe have the other sign
+        entries[..., 1:3] *= np.where(y < 0.0, -1.0, 1.0)[..., None]
+    return entries.reshape(*x.shape, 2, 2)
 
 
 def _canonical(lights: Lights, crossed: bool) -> tuple[Array, Array]:

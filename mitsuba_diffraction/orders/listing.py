@@ -18,14 +18,17 @@ from ..columns import save_numbers
 from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .cells import Array as Real
+from .efficiency import jones_matrices
 from .listed import mirror_of
-from .lists import AXES, CSV_AXES, PAIR, REFLECTED, TRANSMITTED, check_light
+from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, axes_of, check_light
 from .polarised import MIN_ANGLE
 from .response import ListedResponse, orders_between
 from .table import OrderTable
 
 #: Columns of Jones matrices: real and imaginary part, named by leaving and incident polarisation.
 JONES = tuple(f"J_{pair}_{part}" for pair in ("ss", "sp", "ps", "pp") for part in ("re", "im"))
+#: Column of 1 where Jones matrices have the phase of the order, 0 where J_ss is made real.
+WITH_PHASE = "has_phase"
 #: Lines at most: what `efficiencies` reads.
 _MOST_LINES = 2_000_000
 #: Squared cosine of an order below which it is not listed: rounding.
@@ -38,7 +41,7 @@ class Listing(NamedTuple):
     Attributes
     ----------
     columns : names of the numbers: wavelength, θ, φ, order (of a crossed grating two), then shares
-        of s and of p light, or the elements of Jones matrices, `JONES`.
+        of s and of p light, or the elements of Jones matrices, `JONES`, and `WITH_PHASE`.
     rows : (n, columns), a line for each order that propagates.
     """
 
@@ -55,33 +58,33 @@ class Listing(NamedTuple):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a CSV, whose numbers have 7 digits, or NetCDF (.nc), as `lists` has them.
 
-        Raises a DiffractionError if the file cannot be written, or NetCDF is asked for of a crossed
-        grating; no half-written file is left.
+        Raises a DiffractionError if the file cannot be written; no half-written file is left.
         """
         if Path(path).suffix == ".nc":
             self._save_netcdf(Path(path))
             return
-        numbers = ["%d" if name.startswith("order") else "%.7g" for name in self.columns[3:]]
+        whole = (*CSV_AXES[3:], *PAIR, WITH_PHASE)
+        numbers = ["%d" if name in whole else "%.7g" for name in self.columns[3:]]
         save_numbers(Path(path), self.columns, self.rows, ["%.9g", "%.9g", "%.9g", *numbers])
 
     def _save_netcdf(self, path: Path) -> None:
         """Write the numbers over wavelength, theta, phi and order; NaN where none propagates."""
-        if PAIR[0] in self.columns:
-            raise DiffractionError(f"{path}: orders of a crossed grating are written as CSV (.csv)")
+        names = axes_of(self.columns)
+        lights, numbers = self.rows.T[: len(names)], self.rows.T[len(names) :]
         axes, places = zip(
-            *(np.unique(column, return_inverse=True) for column in self.rows.T[:4]), strict=True
+            *(np.unique(column, return_inverse=True) for column in lights), strict=True
         )
         with atomic_path(path) as temporary, netcdf_file(str(temporary), "w") as file:
-            for name, unit, along in zip(
-                AXES, ("nm", "degrees", "degrees", "1"), axes, strict=True
-            ):
+            units = "nm", "degrees", "degrees", "1", "1"
+            for name, unit, along in zip(names, units, axes, strict=False):
                 file.createDimension(name, len(along))
                 variable = file.createVariable(name, "d", (name,))
                 variable[:], variable.units = along, unit
-            for name, column in zip(self.columns[4:], self.rows.T[4:], strict=True):
+            for name, column in zip(self.columns[len(names) :], numbers, strict=True):
                 values = np.full([len(along) for along in axes], np.nan)
                 values[places] = column
-                file.createVariable(name, "d", AXES)[:] = values
+                variable = file.createVariable(name, "d", names)
+                variable[:], variable.units = values, "1"
 
 
 def list_orders(
@@ -108,7 +111,8 @@ def list_orders(
     polarised : whether R_s and R_p hold s and p light; otherwise both are the share of
         unpolarised light.
     from_below : whether the light comes from below a thin sheet, or from within a block.
-    jones : Jones matrices (`efficiency.jones`) in place of efficiencies, J_ps from s to p light.
+    jones : Jones matrices (`efficiency.jones_matrices`) in place of efficiencies, J_ps from s to p
+        light.
     """
     lights = [np.unique(np.asarray(values, np.float64)) for values in (wavelengths, theta, phi)]
     low, high = table.wavelengths
@@ -138,9 +142,12 @@ def list_orders(
     numbers = [m_x, m_y] if table.crossed else [m_x]
     axes = (*CSV_AXES[:3], *(PAIR if table.crossed else CSV_AXES[3:]))
     if jones:
-        elements = table.jones(x, y, lam, m_x, m_y).reshape(-1, 4)
-        shares = [part for column in elements.T for part in (column.real, column.imag)]
-        return Listing((*axes, *JONES), np.column_stack([lam, polar, azimuth, *numbers, *shares]))
+        matrices, with_phase = jones_matrices(table, x, y, lam, m_x, m_y)
+        shares = [part for n in range(4) for part in _parts(matrices[:, n // 2, n % 2])]
+        return Listing(
+            (*axes, *JONES, WITH_PHASE),
+            np.column_stack([lam, polar, azimuth, *numbers, *shares, with_phase]),
+        )
     lookup = table.polarised_efficiency if polarised else table.efficiency
     kinds = REFLECTED + (TRANSMITTED if table.sides == 2 else ())
     below = {"from_below": True} if from_below else {}
@@ -151,6 +158,10 @@ def list_orders(
     if not polarised:
         shares = [np.repeat(values[:, None], 2, axis=1) for values in shares]
     return Listing((*axes, *kinds), np.column_stack([lam, polar, azimuth, *numbers, *shares]))
+
+
+def _parts(numbers: NDArray[np.complex128]) -> tuple[Real, Real]:
+    return numbers.real, numbers.imag
 
 
 def orders_of(table: OrderTable, shortest: float) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ the variables R_s, R_p [, T_s, T_p] over the dimensions wavelength, theta, phi a
 order, with a coordinate variable each; `units` of coordinates are nm (default), um or m, and
 degrees (default) or radians. The column or dimension of φ may be missing: φ = 0.
 
-The CSV of a crossed grating has the columns order_x and order_y in place of order.
+A crossed grating has the columns, or dimensions, order_x and order_y in place of order.
 
 The light comes from ωi = (sinθ cosφ, sinθ sinφ, cosθ), with x along the grating vector and y along
 the grooves, θ and φ within the superstrate, and order m leaves with x = mλ/d − sinθ cosφ; order
@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,7 +52,8 @@ _LENGTHS = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "mic
             "micron": 1e3, "m": 1e9, "meter": 1e9}  # fmt: skip
 _ANGLES = {"deg": 1.0, "degree": 1.0, "°": 1.0, "rad": 180.0 / np.pi, "radian": 180.0 / np.pi}
 _UNITS: dict[str, dict[str, float]] = {
-    "wavelength": _LENGTHS, "theta": _ANGLES, "phi": _ANGLES, "order": {"1": 1.0},
+    "wavelength": _LENGTHS, "theta": _ANGLES, "phi": _ANGLES,
+    **{axis: {"1": 1.0} for axis in ("order", *PAIR)},
 }  # fmt: skip
 _BEGINS_HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -86,6 +87,11 @@ class Variable(NamedTuple):
     dimensions: tuple[str, ...]
     values: Real
     units: str
+
+
+def axes_of(names: Collection[str]) -> tuple[str, ...]:
+    """Return the dimensions of efficiencies, by the columns or variables that there are."""
+    return AXES if set(PAIR).isdisjoint(names) else (*AXES[:3], *PAIR)
 
 
 def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
@@ -176,7 +182,9 @@ def _regular(
 def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
     """Return the grid of a NetCDF file's variables."""
     kinds = _kinds(list(variables), shown, "variable")
-    dimensions = [axis for axis in AXES if axis != "phi" or "phi" in variables[kinds[0]].dimensions]
+    every = axes_of(variables)
+    given = variables[kinds[0]].dimensions
+    dimensions = [axis for axis in every if axis != "phi" or "phi" in given]
     axes = {"phi": np.zeros(1)}
     for axis in dimensions:
         if axis not in variables or variables[axis].dimensions != (axis,):
@@ -191,21 +199,26 @@ def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
         if sorted(variable.dimensions) != sorted(dimensions):
             raise DiffractionError(
                 f"{shown}: {kind} has the dimensions {', '.join(variable.dimensions) or 'none'}; "
-                f"expected {', '.join(AXES)} (phi may be missing)"
+                f"expected {', '.join(every)} (phi may be missing)"
             )
         values = variable.values.transpose([variable.dimensions.index(d) for d in dimensions])
-        parts.append(values.reshape([len(axes[axis]) for axis in AXES]))
+        parts.append(values.reshape([len(axes[axis]) for axis in every]))
     _check_size(parts[0].shape, len(parts), shown)
     values = np.stack(parts, axis=-1)
-    for n, axis in enumerate(AXES):
+    for n, axis in enumerate(every):
         along = axes[axis]
         if not np.isfinite(along).all() or len(np.unique(along)) < len(along):
             raise DiffractionError(f"{shown}: all {axis} must be different, finite numbers")
         values = values.take(np.argsort(along), axis=n)
         axes[axis] = np.sort(along)
-    _check_axes([axes[axis] for axis in AXES], shown)
-    wavelengths, theta, phi, orders = (axes[axis] for axis in AXES)
-    return Efficiencies(wavelengths, theta, phi, orders.astype(np.int64), values)
+    wavelengths, theta, phi, *of_orders = (axes[axis] for axis in every)
+    _check_axes([wavelengths, theta, phi, np.concatenate(of_orders)], shown)
+    orders: NDArray[np.int64] = of_orders[0].astype(np.int64)
+    if every != AXES:
+        pairs = np.meshgrid(*of_orders, indexing="ij")
+        orders = np.stack(pairs, axis=-1).reshape(-1, 2).astype(np.int64)
+        values = values.reshape(*values.shape[:3], len(orders), -1)
+    return Efficiencies(wavelengths, theta, phi, orders, values)
 
 
 def _kinds(names: list[str], shown: str, what: str) -> tuple[str, ...]:
@@ -239,7 +252,7 @@ def _classic(path: str | os.PathLike[str]) -> dict[str, Variable]:
         return {
             name: _variable(variable.dimensions, variable[:], variable._attributes)
             for name, variable in file.variables.items()
-            if name in (*AXES, *REFLECTED, *TRANSMITTED)
+            if name in (*AXES, *PAIR, *REFLECTED, *TRANSMITTED)
         }
 
 
@@ -248,7 +261,7 @@ def _hdf5(path: str | os.PathLike[str]) -> dict[str, Variable]:
     h5py = optional("h5py", repr(os.fspath(path)))
     variables, claimed, shown = {}, 0.0, repr(os.fspath(path))
     with bounded_memory(size := os.path.getsize(path), shown), h5py.File(path, "r") as file:
-        for name in (*AXES, *REFLECTED, *TRANSMITTED):
+        for name in (*AXES, *PAIR, *REFLECTED, *TRANSMITTED):
             if name not in file:
                 continue
             data = file[name]

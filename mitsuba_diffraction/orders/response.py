@@ -131,6 +131,9 @@ class ListedResponse:
         efficiencies of the light of the same K and s (`cells`), as with perfect conductors.
     index : of a clear material below a crossed grating, or None. With it, ratios of elements to
         `optics.orders.order_factor` are interpolated, of incident light about s.
+    phases : (λ, θ, φ, sides, ports) float32, of polarised light: of the largest entry of each Jones
+        matrix about the axes of `polarised`, the first of equal ones, at the origin of the profile;
+        NaN where the light was not solved, or the order does not propagate. None: not known.
     """
 
     axes: tuple[Array, Array, Array]
@@ -138,6 +141,7 @@ class ListedResponse:
     values: NDArray[np.float32]
     in_plane: bool = False
     index: float | None = None
+    phases: NDArray[np.float32] | None = None
 
     @property
     def elements(self) -> int:
@@ -147,7 +151,7 @@ class ListedResponse:
     @property
     def arrays(self) -> list[NDArray[np.float32]]:
         """All numbers."""
-        return [self.values]
+        return [self.values] if self.phases is None else [self.values, self.phases]
 
     @property
     def layout(self) -> str:
@@ -172,6 +176,13 @@ class ListedResponse:
         if not np.array_equal(self.orders, orders_between(self.orders[0], self.orders[-1])):
             raise DiffractionError("a list must have all orders between its first and its last")
         _check_elements(self.values, "listed light")
+        if self.phases is not None and (
+            self.elements != MUELLER or self.phases.shape != self.values.shape[:-1]
+        ):
+            raise DiffractionError(
+                f"phases have the shape {self.phases.shape}, expected {self.values.shape[:-1]} of "
+                "polarised light"
+            )
 
 
 def orders_between(first: Sequence[int], last: Sequence[int]) -> NDArray[np.int64]:

@@ -96,13 +96,17 @@ class LinearMap:
 
     def summed(self, shares: Array) -> LinearMap:
         """Return the map to sums over the last axis, by shares (…, m)."""
+        return self.summed_in(np.full(shares.shape[:-1], shares.shape[-1]), shares)
+
+    def summed_in(self, counts: NDArray[np.integer], shares: Array) -> LinearMap:
+        """Return the map to sums by shares, of as many values in a row as `counts` (…) has."""
         corners = self.matrix
         data = corners.data * np.repeat(shares.ravel(), 4)
-        starts = corners.indptr[:: shares.shape[-1]]
+        starts = 4 * np.concatenate([[0], np.cumsum(counts)])
         rows = scipy.sparse.csr_array(
-            (data, corners.indices, starts), shape=(len(starts) - 1, corners.shape[1])
+            (data, corners.indices, starts), shape=(counts.size, corners.shape[1])
         )
-        return LinearMap(rows, shares.shape[:-1])
+        return LinearMap(rows, counts.shape)
 
 
 @dataclass(frozen=True)

@@ -56,12 +56,13 @@ class OrderMixture:
     beats: NDArray[np.float32] | None
     pitch: float
 
-    def strong_at(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Powers of the strong orders, each at its own κ, shape of κ (..., n)."""
+    def strong_at(
+        self, kappa: NDArray[np.float64], order: NDArray[np.integer]
+    ) -> NDArray[np.float32]:
+        """Powers of strong orders, 0 … n − 1, each at its own κ, (m,)."""
         position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
         lower = position.astype(int)
         share = (position - lower).astype(np.float32)
-        order = np.arange(self.powers.shape[1])
         low, high = self.powers[lower, order], self.powers[lower + 1, order]
         return np.asarray(low * (1.0 - share) + high * share)
 

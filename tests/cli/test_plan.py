@@ -9,6 +9,7 @@ import OpenEXR
 import pytest
 
 from docs.make.figures import tables
+from mitsuba_diffraction.optics.colour import linear_srgb
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -46,6 +47,8 @@ SCENE = """<scene version="3.5.0">
 </scene>
 """
 PATHS = ("--paths", 20000)
+#: X + Y + Z of red, green and blue.
+XYZ = np.linalg.inv(linear_srgb(np.eye(3))).sum(axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +100,27 @@ def test_a_planned_picture_is_the_whole_one(run, folder, planned):
     assert "the table ends at the frequencies" in ran.err
     # direct light is the same in all samples, the sky next to nothing; wavelengths are drawn alike
     assert pictures[1] == pytest.approx(pictures[0], rel=0.01)
+
+
+def test_a_picture_lacks_at_most_the_share_of_light_that_the_plan_states(run, folder):
+    from mitsuba_diffraction.cli import main
+
+    plan, report = folder / "less.toml", folder / "less.json"
+    arguments = ["plan", folder / "foil.xml", "-o", plan, "--json", report, *PATHS]
+    assert main([str(a) for a in (*arguments, "--plan-tolerance", 0.1)]) == 0
+    (table,) = json.loads(report.read_text())["tables"]
+    stated = table["needs"]["share of the light outside, which is missing"]
+    brightness = []
+    for option in ((), ("--plan", plan)):
+        out = folder / "less.exr"
+        ran = run("render", folder / "foil.xml", "-s", 64, "-o", out, *option)
+        assert ran.code == 0, ran.err
+        # X + Y + Z, in which a plan weighs light, of the mean colour
+        brightness.append(pixels(out).mean(axis=(0, 1)) @ XYZ)
+    missing = 1.0 - brightness[1] / brightness[0]
+    assert 0.02 < stated <= 0.1
+    # bins that the limit crosses count as outside, and lobes of the last orders reach beyond it
+    assert 0.0 < missing <= stated
 
 
 def test_a_page_shows_what_is_needed(planned, tmp_path):

@@ -46,7 +46,7 @@ SUN, IRRADIANCE = (0.45, 0.0, 0.893), 3.0
 #: Pixels along a side of the squares whose means are compared, which have less noise.
 BLOCK = 2
 #: Samples of the path tracer and of Cycles, frames of GLSL and samples of the page.
-SAMPLES, CYCLES, FRAMES, PAGE = 256, 192, 64, 64
+SAMPLES, CYCLES, FRAMES, PAGE = 256, 1024, 64, 64
 #: Blocks across an arch whose colours are averaged under the sky, which is smooth: its half.
 SMOOTH = 4
 

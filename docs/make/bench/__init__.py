@@ -11,6 +11,7 @@ orders       `diffraction_orders`: times of the calls, noise of a sample
 survey       a survey of many scans, in one process and on workers
 frames       frames of the shaders
 scenes       scenes to render; noise beside sampling by the cosine
+updates      one change of a parameter in an optimisation
 snake        the time of whole pictures, each scene in a process of its own
 """
 
@@ -67,6 +68,7 @@ def sections(
     from .orders import measure_orders
     from .scenes import measure_efficiency, measure_noise
     from .snake import measure_snake
+    from .updates import measure_updates
 
     tables = functools.cache(lambda: build_tables(plan, folder, progress, patch))
 
@@ -83,6 +85,7 @@ def sections(
             "orders": lambda: measure_orders(plan, scenes, progress),
             "noise": lambda: [measure_noise(plan, tables(), progress)],
             "efficiency": lambda: [measure_efficiency(plan, tables(), scenes, progress)],
+            "update": lambda: [measure_updates(folder, progress)],
             "colours": functools.partial(colours, backend),
         }
         for part, measure in measured.items():

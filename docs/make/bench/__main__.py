@@ -25,8 +25,8 @@ from ..figures.pages import measured_options, measured_patch, option, program
 from . import figures, sections
 
 PARTS = (
-    "build", "survey", "eval", "sample", "snake", "orders", "noise", "efficiency", "colours",
-    "frames",
+    "build", "survey", "eval", "sample", "snake", "orders", "noise", "efficiency", "update",
+    "colours", "frames",
 )  # fmt: skip
 
 
@@ -90,7 +90,8 @@ def _check_scenes(folder: Path) -> None:
     if not (folder / "snake.xml").is_file():
         raise DiffractionError(
             f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
-            "with --scenes, or measure a part without them: --only build, eval, sample or noise"
+            "with --scenes, or measure a part without them: --only build, eval, sample, noise or "
+            "update"
         )
 
 

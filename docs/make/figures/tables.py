@@ -205,7 +205,7 @@ def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
         ("table", *(f"{figures['memory_mb']:.2g} MB" for figures in (whole, planned))),
     ]
     missing = needs["share of the light outside, which is missing"]
-    change = f"and {100 * missing:.2g} % of the light from the skin is missing"
+    change = f"and at most {100 * missing:.2g} % of the light from the skin is missing"
     less = table["times less memory"]
     return {
         "plan": f"{pages.table(('', 'whole table', 'planned'), rows)}\n\n"

@@ -53,6 +53,9 @@ _LOBE_SAMPLES = 256
 #: Least number of samples between neighbouring nodes along p, along q, and along q from a pole,
 #: for ∫ hat cosθ dω within 0.1 %.
 _LEAST = 4, 8, 32
+#: Samples along q for one elsewhere, where azimuths meet: half of a lobe there ends in the middle,
+#: and even samples of x exp(−x²) are off by a twelfth of their distance squared.
+_FINER = 8
 #: Angle from the normal, rad, that stands for 0: φ still turns the axes of a file there.
 _LEAST_THETA = 1e-9
 #: Steepest light, degrees.
@@ -164,7 +167,9 @@ class Nodes:
         parts = []
         for first, last in itertools.pairwise(edges):
             across, along = self.spread(last)
-            least = _LEAST[2 if self.pole and first == low else 1]
+            meet = first == low and self.spread(low)[0] == 0.0
+            along *= _FINER if meet else 1
+            least = _LEAST[2 if meet else 1]
             m = max(math.ceil(across * 2.0 * np.pi / self.azimuths / step), _LEAST[0])
             m, n = m * self.azimuths, max(math.ceil(along * (last - first) / step), least)
             i, j = (part.ravel() for part in np.meshgrid(np.arange(m), np.arange(n), indexing="ij"))

@@ -48,11 +48,11 @@ class _Filled(NamedTuple):
 class CoupledWaves:
     """Coupled waves for one profile.
 
-    Raises a DiffractionError if the profile is undercut.
+    Raises a DiffractionError if an undercut profile has films.
 
     Parameters
     ----------
-    profile : one period of the grooves; no undercut.
+    profile : one period of the grooves, which may be undercut, as slanted ridges are.
     harmonics : spatial frequencies on either side of the middle one. Slopes are cut into as many
         layers.
     structure : films on the profile, slices beneath it, and a substrate.
@@ -61,16 +61,17 @@ class CoupledWaves:
     def __init__(
         self, profile: Profile, harmonics: int, structure: Structure | None = None
     ) -> None:
-        if (np.diff(profile.x) < 0).any():
+        around = structure or Structure()
+        if around.films and (np.diff(profile.x) < 0).any():
             raise DiffractionError(
-                f"{profile.name} is undercut, which coupled waves in layers cannot solve; use "
-                "method=integral"
+                f"{profile.name} is undercut, and films as thick along z everywhere cannot lie on "
+                "it; leave out the layers"
             )
         self.period, self.harmonics = profile.period, harmonics
         levels = np.unique(profile.z)
-        if not profile.is_lamellar:
+        x, z = (np.diff(values) for values in profile.closed)
+        if (x * z).any():  # slopes
             levels = np.linspace(levels[0], levels[-1], harmonics + 1)
-        around = structure or Structure()
         # surfaces of the material and of each film
         offsets = np.append(0.0, np.cumsum([film.thickness for film in around.films]))
         edges = np.unique(np.round(np.add.outer(offsets, levels), _DIGITS))[::-1]
@@ -378,7 +379,11 @@ def _slices(
 
 
 def _intervals(profile: Profile, height: float) -> Real:
-    """Return the ends (n, 2) of the intervals of one period in which the profile is higher."""
+    """Return the ends (n, 2) of the intervals of one period that the material fills at a height.
+
+    The material lies on the right of the line: a side that rises begins an interval, also where x
+    turns back.
+    """
     x, z = profile.closed
     if height < z.min():
         return np.array([[0.0, profile.period]])
@@ -387,7 +392,7 @@ def _intervals(profile: Profile, height: float) -> Real:
 
     def at(side: NDArray[np.int64]) -> Real:
         share = (height - z[side]) / (z[side + 1] - z[side])
-        return np.asarray(x[side] + share * (x[side + 1] - x[side]))
+        return np.sort((x[side] + share * (x[side + 1] - x[side])) % profile.period)
 
     start, end = at(rises), at(falls)
     if len(start) and end[0] < start[0]:  # the first interval began in the period before

@@ -132,31 +132,51 @@ def check_cell(cell: UnitCell, material: TabulatedIndex, wavelengths: tuple[floa
 
 
 class Folded(NamedTuple):
-    """Azimuths that mirror planes make of others, and steps (n, 2) along their orders, ±1."""
+    """Azimuths that mirror planes make of others, and how their orders become those of the light.
+
+    Attributes
+    ----------
+    phi : (n,) degrees.
+    steps : (n, 2) along the orders, ±1.
+    turns : (n, 2) phase of the first order, over 2π: mirrors need not pass through the origin.
+    """
 
     phi: Real
     steps: NDArray[np.int64]
+    turns: Real
 
 
-def folded(cell: UnitCell, phi: ArrayLike) -> Folded:
-    """Return azimuths (n,), degrees, of which mirror planes of the heights make all."""
-    azimuth = np.asarray(phi, np.float64) % 360.0
+def folded(cell: UnitCell | None, phi: ArrayLike) -> Folded:
+    """Return azimuths (n,), degrees, of which mirror planes of the heights make all.
+
+    cell : None for grooves, whose azimuths stay as they are.
+    """
+    azimuth = np.asarray(phi, np.float64)
     steps = np.ones((len(azimuth), 2), np.int64)
+    if cell is None:
+        return Folded(azimuth, steps, np.zeros(steps.shape))
+    azimuth = azimuth % 360.0
     along_x, along_y = _mirrors(cell.heights)
-    if along_y:
+    if along_y is not None:
         steps[:, 1] = np.where(beyond := azimuth > 180.0, -1, 1)
         azimuth = np.where(beyond, 360.0 - azimuth, azimuth)
-    if along_x:
+    if along_x is not None:
         steps[:, 0] = np.where(beyond := (azimuth > 90.0) & (azimuth < 270.0), -1, 1)
         azimuth = np.where(beyond, (180.0 - azimuth) % 360.0, azimuth)
-    return Folded(np.round(azimuth, 9), steps)
+    turns = np.where(steps < 0, [along_x or 0.0, along_y or 0.0], 0.0)
+    return Folded(np.round(azimuth, 9), steps, turns)
 
 
-def _mirrors(heights: Real) -> tuple[bool, bool]:
-    """Whether the periodic heights equal their mirror images along x and along y."""
-    found = []
+def _mirrors(heights: Real) -> tuple[float | None, float | None]:
+    """Return a, along x and along y, where heights at x are those at a − x; None without mirror.
+
+    a is a part of the period, from the middle of the first pixel.
+    """
+    found: list[float | None] = []
     for axis in (1, 0):
         image = np.flip(heights, axis)
-        shifts = (np.roll(image, n, axis) for n in range(image.shape[axis]))
-        found.append(any(np.allclose(heights, shifted, atol=1e-9) for shifted in shifts))
+        count = image.shape[axis]
+        shifted = (np.roll(image, n, axis) for n in range(count))
+        alike = (np.allclose(heights, each, atol=1e-9) for each in shifted)
+        found.append(next(((n - 1) / count for n, same in enumerate(alike) if same), None))
     return found[0], found[1]

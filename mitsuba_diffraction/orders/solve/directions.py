@@ -22,8 +22,8 @@ from ..response import LINEAR, MUELLER, ListedResponse, orders_between
 from ..table import OrderTable, check_outline
 from .accuracy import measured_error, powers, warn_of_error
 from .crossed import folded
-from .jobs import LEAST_COSINES, Jobs, Problem
-from .nodes import located
+from .jobs import Jobs, Problem
+from .nodes import AnyPlace, located
 from .resolution import resolved
 from .settings import (
     MOST_EXCESS,
@@ -33,9 +33,9 @@ from .settings import (
     announce_stage,
     header_of,
 )
-from .stations import Complex, Grating, Real
+from .stations import LEAST_COSINE, Complex, Grating, Real
 
-#: Lights of which the resolution is chosen, and solutions at most.
+#: Lights by which the resolution is chosen at most, and solutions at most.
 _COMPARED, _MOST = 5, 100_000
 
 
@@ -81,20 +81,26 @@ def solve_directions(
     waves, theta = (
         np.repeat(part, azimuth.size) for part in np.meshgrid(lam, polar, indexing="ij")
     )
-    bearings, steps = azimuth, np.ones((azimuth.size, 2), np.int64)
-    if grating.cell is not None:
-        bearings, steps = folded(grating.cell, azimuth)
+    bearings, steps, turns = folded(grating.cell, azimuth)
     phi = bearings[number]
-    _refuse_grazing(problem, waves, theta, phi)
     factors = [1.0, 1.0 / block] if block else [1.0] * grating.sides  # side 0 of a block is within
     x, y = (np.round(part, 12) + 0.0 for part in mirror_of(theta, phi))
     if grating.cell is None:  # solvers take y ≥ 0, the mirror image
         y = np.abs(y)
     found = [located(grating, factor * x, factor * y, waves) for factor in factors]
     every = [light.place for of_side in found for light in of_side]
-    compared = every[:: max(len(every) // _COMPARED, 1)]
+    compared = every[:: -(-len(every) // _COMPARED)]
+    if grating.cell is None:
+        problem = replace(problem, least_cosine=LEAST_COSINE)
+        worst = _nearest_grazing(grating, x, y, waves)
+        compared += [of_side[worst].place for of_side in found]
+        compared = list(dict.fromkeys(compared))
+    ports: dict[AnyPlace, list[int]] = {place: [] for place in every}
+    for came, of_side in enumerate(found):
+        for light in of_side:
+            ports[light.place].append(came * len(light.orders) + light.port)
     announce_comparison(announce, problem, work, compared)
-    chosen = resolved(problem, work, compared, how.tolerance / 2)
+    chosen = resolved(problem, work, compared, how.tolerance / 2, ports)
     ends = np.concatenate([light.orders for of_side in found for light in of_side])
     first, last = ends.min(axis=0), ends.max(axis=0)
     if (steps < 0).any():
@@ -104,6 +110,7 @@ def solve_directions(
     if grating.thin and (np.abs(y) > 1e-9).any():
         elements = 1  # without phases, which tell s from p
     values = np.full((len(waves), grating.sides, grating.sides, len(orders), elements), np.nan)
+    jones = np.full((*values.shape[:-1], 4), np.nan, np.complex128) if how.polarised else None
     announce_stage(announce, "solving", chosen.problem, work, every, 4.0 * values.size)
     solved = work.amplitudes(chosen.problem, every, "solving orders")
     for came, of_side in enumerate(found):
@@ -114,10 +121,16 @@ def solve_directions(
             places = (light.orders * step - first) @ [1, int(last[0] - first[0]) + 1]
             for left in range(grating.sides):
                 values[n, came, left, places] = rows[left * size : (left + 1) * size]
+            if jones is not None:  # no sheet or block
+                matrices = solved[light.place][0, light.port].transpose(1, 2, 0).reshape(size, 4)
+                phase = np.exp(2j * np.pi * (light.orders @ turns[number[n]]))
+                odd = np.array([1, step.prod(), step.prod(), 1])
+                jones[n, 0, 0, places] = matrices * odd * phase[:, None]
     header = header_of(chosen, how) | dict(facts)
     if not lights.is_all:
         header["directions"] = [[float(t), float(p)] for t in polar for p in azimuth]
-    table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]))
+    matrices = None if jones is None else jones.reshape(*shape, *jones.shape[1:])
+    table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]), matrices)
     made = listed_table(
         table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
     )  # fmt: skip
@@ -137,24 +150,12 @@ def _clear_index(grating: Grating) -> float | None:
     return None if index.imag or index.real <= 1.0 else float(index.real)
 
 
-def _refuse_grazing(problem: Problem, waves: Real, theta: Real, phi: Real) -> None:
-    """Refuse light with an order so near to grazing that the method loses its digits."""
-    least = LEAST_COSINES.get(problem.method, 0.0)
-    if least == 0.0:
-        return
-    optical = problem.grating.optical_period
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
-    most = int(2e3 * optical / waves.min()) + 1
-    steps = np.arange(-most, most + 1)[:, None] * waves / (1e3 * optical)
-    c = np.sqrt(1.0 - np.minimum((sine * np.sin(turn)) ** 2, 1.0))
-    square = 1.0 - ((steps - sine * np.cos(turn)) / c) ** 2
-    if (near := (square > 0.0) & (square < least**2)).any():
-        n = int(np.argwhere(near)[0][1])
-        raise DiffractionError(
-            f"at {waves[n]:g} nm, theta {theta[n]:g}°, phi {phi[n]:g}° an order leaves within 1.7° "
-            f"of grazing, where method {problem.method} loses its digits; use method=coupled or "
-            "chandezon, or leave this light out"
-        )
+def _nearest_grazing(grating: Grating, x: Real, y: Real, waves: Real) -> int:
+    """Return the light (n,) with the order nearest to grazing, where solvers converge last."""
+    steps = waves / (1e3 * grating.optical_period)
+    most = int(2.0 / steps.min()) + 1
+    leaves = x + np.arange(-most, most + 1)[:, None] * steps
+    return int(np.abs(1.0 - leaves**2 - y**2).min(axis=0).argmin())
 
 
 def _elements(amplitudes: Complex, port: int, count: int, thin: bool) -> Real:

@@ -28,7 +28,7 @@ from .crossed import CrossedWaves
 from .integral import IntegralSolver
 from .nodes import AnyPlace, CrossedPlace
 from .sheet import sheet_efficiencies
-from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, on_both_sides
+from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, Station, on_both_sides
 
 Spot = TypeVar("Spot", bound=AnyPlace)
 
@@ -40,8 +40,9 @@ METHODS: dict[str, Callable[..., Solver]] = {
 #: Method of crossed gratings, the only one.
 CROSSED = "crossed"
 LAYERED = ("coupled", "chandezon")
-#: Least |cosine| of any order across the grooves (`stations.LEAST_COSINE`) of the solvers that lose
-#: digits as 1/cosine: 1.7° from grazing, where diffuse light has 1e-3 of its power.
+#: Least |cosine| of any order across the grooves (`stations.LEAST_COSINE`) in tables of all light,
+#: by solvers that lose digits as 1/cosine: 1.7° from grazing, where diffuse light has 1e-3 of its
+#: power. Listed light has the resolution that it needs there.
 LEAST_COSINES = {"integral": 0.03}
 #: Choice of the solver by the grating, see `method_for`.
 AUTO = "auto"
@@ -55,6 +56,8 @@ _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 class Problem:
     """Grating, solver and its resolution; `digest` identifies the grating and the solver.
 
+    Light nearer to grazing than `least_cosine` has the efficiencies there (`stations`).
+
     Raises a DiffractionError if the resolution is above `MOST_RESOLUTION`.
     """
 
@@ -62,6 +65,7 @@ class Problem:
     method: str
     resolution: int
     digest: str
+    least_cosine: float = LEAST_COSINE
 
     def __post_init__(self) -> None:
         if self.resolution > MOST_RESOLUTION[self.method]:
@@ -117,7 +121,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
         structure.lengths,
         *(part for medium in structure.materials for part in (medium.wavelengths, medium.values)),
     )  # fmt: skip
-    return Problem(grating, method, resolution, digest)
+    return Problem(grating, method, resolution, digest, LEAST_COSINES.get(method, LEAST_COSINE))
 
 
 def digest_of(*parts: object) -> str:
@@ -160,7 +164,7 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     Values are rounded as they are stored, so that a table is the same whether or not it was
     interrupted.
 
-    Raises a DiffractionError if the solver fails on the profile.
+    Raises a DiffractionError if the solver fails on the profile, or has too few harmonics.
     """
     solver = solver_of(problem)
     start, grating = time.thread_time(), problem.grating
@@ -169,8 +173,11 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
         station = grating.crossed_station(place.x, place.y, place.w[0])
     else:
         w = place.w[:1] if grating.is_perfect else place.w
-        least = LEAST_COSINES.get(problem.method, LEAST_COSINE)
-        station = grating.station(place.band, place.kind, place.tau, place.rho, w, least)
+        station = grating.station(
+            place.band, place.kind, place.tau, place.rho, w, problem.least_cosine
+        )
+        if problem.method in LAYERED:
+            _check_harmonics(problem, station)
     try:
         values = solver.amplitudes(station)
     except DiffractionError:
@@ -186,6 +193,17 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     if grating.block:
         values = on_both_sides(values, station)
     return Solved(values.astype(np.complex64), time.thread_time() - start)
+
+
+def _check_harmonics(problem: Problem, station: Station) -> None:
+    """Refuse a resolution whose harmonics are fewer than the orders that propagate."""
+    middle = station.channels // 2
+    numbers = np.append(station.inside, [0, station.channels - 1]) - middle
+    if (needed := int(np.abs(numbers).max())) > problem.resolution:
+        raise DiffractionError(
+            f"{problem.grating.profile.name} at resolution {problem.resolution}: more orders "
+            f"propagate; use a resolution of at least {needed}, or leave it out"
+        )
 
 
 @dataclass
@@ -273,7 +291,7 @@ class Jobs:
 
 def _names(problem: Problem, places: Iterable[Spot]) -> dict[Spot, str]:
     """Return the names of the solutions of places."""
-    outline = problem.digest, problem.resolution
+    outline = problem.digest, problem.resolution, problem.least_cosine
     return {place: digest_of((*outline, tuple(place)))[:24] for place in places}
 
 

@@ -161,11 +161,6 @@ def _block(profile: Profile, substance: TabulatedIndex, how: Settings) -> Gratin
     check_choice("method", how.method, (AUTO, "coupled"))
     known = substance.index(np.asarray(how.wavelengths))
     assert known is not None
-    if (np.diff(profile.x) < 0).any():
-        raise DiffractionError(
-            f"{profile.name} is undercut: blocks are solved by coupled waves, whose lines never "
-            "turn back; use another profile"
-        )
     index = float(known[0].real)
     check_outline((profile.period, math.inf), how.wavelengths, block=index, listed=True)
     turned = Profile(profile.x, -profile.z, profile.period, profile.name)

@@ -30,6 +30,10 @@ _FEWEST_POINTS, _POINTS_PER_CORNER = 48, 12
 _HARMONICS, _FEWEST_CROSSED = 8, 3
 
 
+#: Incident ports of a place's station whose light is compared.
+Ports = Mapping[AnyPlace, Sequence[int]]
+
+
 class Chosen(NamedTuple):
     """Problem with a resolution, and its error: the change to the next resolution."""
 
@@ -38,11 +42,17 @@ class Chosen(NamedTuple):
 
 
 def chosen_resolution(
-    problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], tolerance: float
+    problem: Problem,
+    jobs: Jobs,
+    places: Sequence[AnyPlace],
+    tolerance: float,
+    ports: Ports | None = None,
 ) -> Chosen:
     """Raise the resolution until the next one changes the light in orders by `tolerance` at most.
 
-    places : where resolutions are compared, such as `test_places`.
+    places : where resolutions are compared, such as `places_to_test`.
+    ports : whose light is compared; None compares all. Long periods have hundreds in a station, of
+        which those at grazing incidence converge last.
 
     Raises a DiffractionError if it does not converge.
     """
@@ -51,11 +61,12 @@ def chosen_resolution(
     for number in range(_MOST):
         if number and _finer(coarse) > MOST_RESOLUTION[problem.method]:
             break
-        fine, finer, error = _refined(coarse, values, jobs, places)
-        excess = max(float(values[p].sum(axis=(3, 4)).max()) for p in places) - 1.0
+        fine, finer, error = _refined(coarse, values, jobs, places, ports)
+        lit = _incident(values, ports)
+        excess = max(float(each.sum(axis=(3, 4)).max()) for each in lit.values()) - 1.0
         if problem.grating.thin:  # which loses no light either
-            excess = energy_error(values.values())
-        one_way = reciprocity_error(values, problem.grating.sides)
+            excess = energy_error(lit.values())
+        one_way = reciprocity_error(values, problem.grating.sides, ports)
         allowed = max(_EXCESS, 0.1 * tolerance)
         if error <= tolerance and excess <= allowed and one_way <= 2 * tolerance:
             return Chosen(coarse, error)
@@ -69,21 +80,40 @@ def chosen_resolution(
     )
 
 
-def resolved(problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], tolerance: float) -> Chosen:
+def resolved(
+    problem: Problem,
+    jobs: Jobs,
+    places: Sequence[AnyPlace],
+    tolerance: float,
+    ports: Ports | None = None,
+) -> Chosen:
     """Return a problem with its error; a resolution of 0 is chosen, see `chosen_resolution`."""
     if problem.resolution == 0:
-        return chosen_resolution(problem, jobs, places, tolerance)
-    return Chosen(problem, resolution_error(problem, jobs, places))
+        return chosen_resolution(problem, jobs, places, tolerance, ports)
+    return Chosen(problem, resolution_error(problem, jobs, places, ports))
 
 
-def resolution_error(problem: Problem, jobs: Jobs, places: Sequence[AnyPlace]) -> float:
+def resolution_error(
+    problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], ports: Ports | None = None
+) -> float:
     """Return the share of the light at some places that the next resolution changes."""
     values = jobs.solve(problem, places, "checking the resolution")
-    return _refined(problem, values, jobs, places)[2]
+    return _refined(problem, values, jobs, places, ports)[2]
+
+
+def _incident(solved: Mapping[Any, Real], ports: Ports | None) -> dict[Any, Real]:
+    """Return the efficiencies (w, j, 2, q, 2) of light that is incident in some ports j."""
+    if ports is None:
+        return dict(solved)
+    return {place: values[:, ports[place]] for place, values in solved.items()}
 
 
 def _refined(
-    problem: Problem, values: Mapping[Any, Real], jobs: Jobs, places: Sequence[AnyPlace]
+    problem: Problem,
+    values: Mapping[Any, Real],
+    jobs: Jobs,
+    places: Sequence[AnyPlace],
+    ports: Ports | None,
 ) -> tuple[Problem, dict[Any, Real], float]:
     """Return the problem at the next resolution, its efficiencies, and the share that changes.
 
@@ -91,9 +121,10 @@ def _refined(
     """
     fine = finer_problem(problem)
     finer = jobs.solve(fine, places, "choosing the resolution")
-    missed = sum(float(np.abs(finer[p] - values[p]).sum()) for p in places)
-    light = sum(float(finer[p].sum()) for p in places)
-    if light < _DARK * sum(values[p].shape[1] for p in places):
+    before, after = _incident(values, ports), _incident(finer, ports)
+    missed = sum(float(np.abs(after[p] - before[p]).sum()) for p in places)
+    light = sum(float(after[p].sum()) for p in places)
+    if light < _DARK * sum(after[p].shape[1] for p in places):
         raise DiffractionError(
             f"{problem.grating.profile.name} of {material_text(problem.grating)} reflects no "
             "light; choose materials that differ from the medium above, and layers that light "
@@ -124,18 +155,19 @@ def places_to_test(bands: Sequence[int]) -> list[Place]:
     ]
 
 
-def reciprocity_error(solved: Mapping[Any, Real], sides: int) -> float:
+def reciprocity_error(solved: Mapping[Any, Real], sides: int, ports: Ports | None = None) -> float:
     """Return the largest violation of reciprocity, unpolarised, at the places of t = ½.
 
     They are their own reverse: a solver that conserves reciprocity has none. It is the share of the
     light of one channel, summed over the outgoing ones; 0 without such places.
     """
-    differences = [
-        np.abs(values - reversed_light(values, sides))
+    differences = {
+        place: np.abs(values - reversed_light(values, sides))
         for place, values in solved.items()
         if isinstance(place, Place) and place.tau == 0.5
-    ]
-    sums = (float(each.sum(axis=-1).mean(axis=2).sum(axis=-1).max()) for each in differences)
+    }
+    lit = _incident(differences, ports).values()
+    sums = (float(each.sum(axis=-1).mean(axis=2).sum(axis=-1).max()) for each in lit)
     return max(sums, default=0.0)
 
 
@@ -156,7 +188,8 @@ def coarsest(problem: Problem) -> int:
     dense = np.maximum(grating.superstrate, 0.0 if index is None else np.abs(index))
     waves = float((1e3 * dense / lam).max())  # per µm
     if problem.method in ("coupled", "chandezon"):
-        per_period = grating.superstrate * 1e3 / low
+        # a sheet's orders within its material count, too
+        per_period = waves if grating.thin else grating.superstrate * 1e3 / low
         least = int(np.ceil(profile.period * per_period)) + _HARMONICS
         if problem.method == "coupled":
             return least

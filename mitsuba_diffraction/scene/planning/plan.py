@@ -37,7 +37,8 @@ class PlannedTable:
     light : the table of all orders, and the light that it sends.
     settings : of the limited table; None where it would save too little.
     table : the limited table, or the table of all orders.
-    outside : share of the surfaces' light that is looked up beyond the limits, and missing.
+    outside : share of the surfaces' light that is looked up beyond the limits, or in bins that they
+        cross: at most so much is missing, as lobes of the last orders reach beyond.
     """
 
     light: TableLight
@@ -120,9 +121,9 @@ def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
     values = {name: getattr(settings, name) for name in RECIPE_SETTINGS}
     table = {name: value for name, value in values.items() if value != getattr(default, name)}
     comment = (
-        f"Planned for {surfaces} in {scene}: {100 * planned.outside:.2g} % of the light that its\n"
-        "camera sees of them lies beyond these limits, and is missing. Plan again when camera or\n"
-        "lights change."
+        f"Planned for {surfaces} in {scene}: at most {100 * planned.outside:.2g} % of the light\n"
+        "that its camera sees of them lies beyond these limits, and is missing. Plan again when\n"
+        "camera or lights change."
     )
     return replace(recipe, table=table), comment
 

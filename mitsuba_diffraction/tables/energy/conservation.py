@@ -16,6 +16,7 @@ import weakref
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,8 @@ _PHASE = 0.8
 _FEWEST_STEPS = 4
 #: As good as no heights at all.
 _FLAT = 1e-3
+#: Height scales whose orders are kept: those on both sides of an optimised one.
+_KEPT = 2
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,25 @@ _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
 )
 
 
+_scattered_orders: weakref.WeakKeyDictionary[DiffractionTable, dict[object, ScatteredOrders]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def _scattered(table: DiffractionTable, *arguments: Any) -> ScatteredOrders:
+    """Return a table's orders, the last `_KEPT` from memory: they are the same for all materials.
+
+    arguments : further ones of `ScatteredOrders`.
+    """
+    kept = _scattered_orders.setdefault(table, {})
+    key = arguments, energy_settings()
+    found = kept.pop(key, None) or ScatteredOrders(table, *arguments)
+    kept[key] = found
+    for old in list(kept)[:-_KEPT]:
+        kept.pop(old, None)
+    return found
+
+
 class SurfaceEnergy:
     """A table's surface of a material at one height scale.
 
@@ -99,7 +121,7 @@ class SurfaceEnergy:
         if isinstance(material, Reflector):
             finer += thick(material.index(np.array(table.wavelength_range[:1])))
         light = wavelength_range or table.wavelength_range
-        self.orders = ScatteredOrders(table, light, height_scale, material.densest, finer)
+        self.orders = _scattered(table, light, height_scale, material.densest, finer)
         polar = settings.side_polar if self._both_sides else settings.polar
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))

@@ -43,6 +43,8 @@ LEAST_WEAK = 2e-3
 #: Width of order 0's lobe, in direction cosines, above which it is summed over all directions, as G
 #: differs from one azimuth to another. The quadrature resolves lobes half as wide.
 _WIDE = 0.08
+#: Pairs of a direction and an order that are looked at together.
+_PAIRS = 1 << 16
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
@@ -215,41 +217,60 @@ class Transport:
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
         scale = self._path.sign * k / mixture.pitch
-        bx, by = scale * (nodes.x + sine)[:, None], scale * nodes.y
+        x, y = scale * (nodes.x + sine), scale * nodes.y
         sin, cos = np.sin(phi)[:, None], np.cos(phi)[:, None]
         rows, columns = mixture.density.shape[1:]
-        column = np.clip((cos * bx - sin * by + 0.5 * columns).astype(np.int32), 0, columns - 1)
-        row = np.clip((sin * bx + cos * by + 0.5 * rows).astype(np.int32), 0, rows - 1)
-        index = (lower[:, None] * rows + row) * columns + column
-        shares = np.float32(0.0)
+        shares = np.zeros((len(theta), len(phi), len(nodes.x)), np.float32)
+        factors = []
         for density, gain in densities:
-            flat = density.ravel()
             factor = (k**2 * nodes.weights * nodes.cosine * gain).astype(np.float32)
-            shares = shares + flat.take(index) * (factor * (1.0 - upper_share))[:, None]
-            shares += flat.take(index + rows * columns) * (factor * upper_share)[:, None]
-        return np.asarray(shares)
+            factors.append((density.ravel(), factor * (1.0 - upper_share), factor * upper_share))
+        for n, page in enumerate(shares):  # one polar angle at a time stays in a processor's cache
+            column = (cos * x[n] - sin * y + 0.5 * columns).astype(np.int32)
+            row = (sin * x[n] + cos * y + 0.5 * rows).astype(np.int32)
+            np.clip(column, 0, columns - 1, out=column)
+            np.clip(row, 0, rows - 1, out=row)
+            index = (lower[n] * rows + row) * columns + column
+            for flat, of_lower, of_upper in factors:
+                page += flat.take(index) * of_lower[n]
+                page += flat.take(index + rows * columns) * of_upper[n]
+        return shares
 
-    def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> LinearMap:
+    def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:
         """Return the map from weights on a grid to the light of the strong orders."""
+        rows = max(1, _PAIRS // (len(phi) * self._orders.strong))
+        parts = [
+            self._strong_part(theta[n : n + rows], phi, grid) for n in range(0, len(theta), rows)
+        ]
+        return lambda s: np.concatenate([part(s) for part in parts])
+
+    def _strong_part(self, theta: Real, phi: Real, grid: DirectionGrid) -> LinearMap:
+        """Return the part of `_strong` for some polar angles: pairs that a processor's cache holds.
+
+        Of the pairs of a direction and an order, those below the horizon are left out at once.
+        """
         mixture = self._orders.mixture
-        cos_i, sine = self._start(theta[:, None, None])
+        cosines, sine = self._start(theta[:, None, None])
         places = mixture.frequency * (self._path.sign / self._k)
         x = places[:, 0] - sine * np.cos(phi)[:, None]
         y = places[:, 1] - sine * np.sin(phi)[:, None]
-        radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
+        square = x * x + y * y
+        pairs = square < (1.0 + LOBE_END * self._width) ** 2
+        row, column, order = np.nonzero(pairs)
+        radius, azimuth = np.sqrt(square[pairs]), np.arctan2(y[pairs], x[pairs])
+        cos_i = cosines.ravel()[row]
         visible, cos_o, pole = lobe_means(self._width, radius)
         kappa = self._kappa(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
-        turn = azimuth - phi[:, None]
+        turn = azimuth - phi[column]
         gain = self._gain(cos_i, cos_o, turn)
         # G cosθ is linear in cosθ across a lobe whose mean of 1/cosθ is `pole`
         near = cos_o * pole > 1.001
-        at_horizon = LEAST_COSINE * self._gain(
-            np.broadcast_to(cos_i, near.shape)[near], np.asarray(LEAST_COSINE), turn[near]
-        )
+        at_horizon = LEAST_COSINE * self._gain(cos_i[near], np.asarray(LEAST_COSINE), turn[near])
         rising = np.clip(at_horizon / np.maximum(gain[near] * cos_o[near], 1e-30), 0.0, 1.0)
         gain[near] *= 1.0 + rising * (cos_o[near] * pole[near] - 1.0)
-        shares = (mixture.strong_at(kappa) * gain * visible).astype(np.float32)
-        return grid.interpolation(np.arccos(cos_o), azimuth).summed(shares)
+        shares = (mixture.strong_at(kappa, order) * gain * visible).astype(np.float32)
+        to_orders = grid.interpolation(np.arccos(cos_o), azimuth)
+        return to_orders.summed_in(np.count_nonzero(pairs, axis=-1), shares)
 
 
 @dataclass(frozen=True)

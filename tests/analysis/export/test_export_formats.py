@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 
@@ -112,28 +113,31 @@ def by_order(directions, power, orders):
 LIGHTS = ((0.0, 0.0), (30.0, 60.0), (60.0, 240.0))
 
 
+def rgl_power(path, theta, phi):
+    """Directions (n, 3) and power at 550 nm, as Mitsuba reads a file of 48 nodes."""
+    measured = mi.load_dict({"type": "measured", "filename": str(path)})
+    u, v = ((np.arange(n) + 0.5) / n for n in (47 * 16, 47 * 8))
+    u, v = (axis.ravel() for axis in np.meshgrid(u, v, indexing="ij"))
+    theta_m = 0.5 * np.pi * u * u
+    half, wi = polar(np.degrees(theta_m), 360.0 * v), polar(theta, phi)
+    cosine = half @ wi
+    wo = 2.0 * cosine[:, None] * half - wi
+    solid = 4.0 * cosine * np.sin(theta_m) * np.pi * u * 2.0 * np.pi / len(u)
+    lit = (wo[:, 2] > 1e-6) & (cosine > 0.0)
+    return wo[lit], f(measured, wi, wo[lit], 550.0) * wo[lit, 2] * solid[lit]
+
+
 def test_mitsuba_integrates_each_order_of_the_tensors(tmp_path):
     """Within 1 %, of a turned grating: orders 0.2° wide, cells of some degrees."""
     table = thin_grating(1.2, counts=(6, 5, 2), wavelengths=(500.0, 600.0))
     bsdf = mi.load_dict(md.bsdf_dict(table, orientation=30.0))
     grid = ExportGrid(np.linspace(0, 60, 3), np.arange(-180.0, 181, 60), np.array([550.0, 551]), 48)
     rgl.save_rgl(bsdf, tmp_path / "m.bsdf", grid)
-    measured = mi.load_dict({"type": "measured", "filename": str(tmp_path / "m.bsdf")})
-    u, v = ((np.arange(n) + 0.5) / n for n in (47 * 16, 47 * 8))
-    u, v = (axis.ravel() for axis in np.meshgrid(u, v, indexing="ij"))
-    theta_m = 0.5 * np.pi * u * u
-    half = polar(np.degrees(theta_m), 360.0 * v)
     for theta, phi in LIGHTS:
-        wi = polar(theta, phi)
-        cosine = half @ wi
-        wo = 2.0 * cosine[:, None] * half - wi
-        solid = 4.0 * cosine * np.sin(theta_m) * np.pi * u * 2.0 * np.pi / len(u)
-        lit = (wo[:, 2] > 1e-6) & (cosine > 0.0)
-        power = f(measured, wi, wo[lit], 550.0) * wo[lit, 2] * solid[lit]
+        wo, power = rgl_power(tmp_path / "m.bsdf", theta, phi)
         directions, expected = orders_of(table, theta, phi, 550.0, 30.0)
-        got = by_order(wo[lit], power, directions)
         assert power.sum() == pytest.approx(expected.sum(), rel=0.01)
-        np.testing.assert_allclose(got, expected, rtol=0.01, atol=1e-3)
+        np.testing.assert_allclose(by_order(wo, power, directions), expected, rtol=0.01)
 
 
 def read_zemax(path):
@@ -219,25 +223,55 @@ def test_each_order_of_zemax_s_file_has_the_table_s_light(tmp_path):
         assert tis[n, n] == pytest.approx(expected.sum(), rel=1e-3)
         wo, power = zemax_power(axes, values[n, n], theta, rotation)
         assert power.sum() == pytest.approx(expected.sum(), rel=0.01)
-        np.testing.assert_allclose(by_order(wo, power, directions), expected, rtol=0.01, atol=1e-3)
+        np.testing.assert_allclose(by_order(wo, power, directions), expected, rtol=0.01)
+
+
+def mirrors():
+    """Flat mirrors: of a table, and of heights under windows of 65 µm and more."""
+    yield mi.load_dict(md.bsdf_dict(OrderTable.mirror(0.6, 0.6)))
+    for width in (65.0, 130.0):
+        yield mi.load_dict(md.bsdf_dict(FLAT, material="none", coherence_width=width))
+
+
+def lobe_power(bsdf, theta):
+    """Power within 12° of the mirror direction of light from φ = 180°, by fine sums."""
+    azimuth, radial = np.meshgrid(np.arange(0.0, 360, 3), np.arange(0.005, 12, 0.01), indexing="ij")
+    wo = zemax_directions(theta, 0.0, azimuth, radial).reshape(-1, 3)
+    values = f(bsdf, np.tile(polar(theta, 180.0), (len(wo), 1)), wo, 550.0)
+    solid = np.sin(np.radians(radial.ravel())) * np.radians(3.0) * np.radians(0.01)
+    return float((values * wo[:, 2] * solid).sum())
+
+
+def near(wo, power, theta):
+    """Power within 12° of the mirror direction."""
+    return power[wo @ polar(theta, 0.0) > np.cos(np.radians(12.0))].sum()
+
+
+def test_mirrors_and_narrow_lobes_keep_their_light_in_the_tensors(tmp_path):
+    grid = ExportGrid(
+        np.linspace(0, 60, 3), np.arange(-180.0, 181, 180), np.array([550.0, 551]), 48
+    )
+    for bsdf in itertools.islice(mirrors(), 2):
+        rgl.save_rgl(bsdf, tmp_path / "m.bsdf", grid)
+        for theta in (0.0, 30.0):
+            wo, power = rgl_power(tmp_path / "m.bsdf", theta, 180.0)
+            assert near(wo, power, theta) == pytest.approx(lobe_power(bsdf, theta), rel=0.01)
 
 
 def test_mirrors_and_narrow_lobes_keep_their_light_in_zemax_s_file(tmp_path):
-    """A flat mirror under windows of 65 µm: Fresnel's reflectance of aluminium, in the mirror's
-    direction, whether its lobe is rendered by heights or by a table."""
+    """In the mirror's direction, whether its lobe is rendered by heights or by a table."""
     grid = ExportGrid(np.array([0.0, 30]), np.array([0.0]), np.array([550.0]), 86)
-    for surface, expected in (
-        (md.bsdf_dict(OrderTable.mirror(0.6, 0.6)), 0.6),
-        (md.bsdf_dict(FLAT, material="none"), 1.0),
-    ):
-        zemax.save_zemax(mi.load_dict(surface), tmp_path / "m.bsdf", grid)
+    for bsdf, reflectance in zip(mirrors(), (0.6, 1.0, 1.0), strict=True):
+        zemax.save_zemax(bsdf, tmp_path / "m.bsdf", grid)
         _, axes, tis, values = read_zemax(tmp_path / "m.bsdf")
-        assert tis == pytest.approx(expected, rel=0.01)
-        wo, power = zemax_power(axes, values[0, 1], 30.0, 0.0)
-        near = wo @ polar(30.0, 0.0) > np.cos(np.radians(5.0))
-        assert power[near].sum() == pytest.approx(expected, rel=0.01)
+        for n, theta in enumerate((0.0, 30.0)):
+            expected = lobe_power(bsdf, theta)
+            assert expected == pytest.approx(reflectance, rel=0.01)
+            wo, power = zemax_power(axes, values[0, n], theta, 0.0)
+            assert tis[0, n] == pytest.approx(expected, rel=0.01)
+            assert near(wo, power, theta) == pytest.approx(expected, rel=0.01)
     with pytest.raises(DiffractionError, match="expected one"):
-        zemax.save_zemax(mi.load_dict(surface), tmp_path / "m.bsdf", scatter.DEFAULT)
+        zemax.save_zemax(bsdf, tmp_path / "m.bsdf", scatter.DEFAULT)
 
 
 def test_windows_too_wide_to_integrate_are_refused(tmp_path):
@@ -261,6 +295,49 @@ def test_a_csv_has_the_scatter_of_each_pair(tmp_path):
     wo = polar(columns[one, 2], columns[one, 3])
     expected = f(bsdf, polar(40.0, 30.0), wo, 500.0)
     assert np.corrcoef(columns[one, 5], expected)[0, 1] > 0.98
+
+
+def csv_power(path, theta, phi):
+    """Directions (n, 3) and power of f, read by NumPy, linear between the nodes of one light."""
+    lines = np.genfromtxt(path, delimiter=",", names=True)
+    lines = lines[(lines["theta_i_deg"] == theta) & (lines["phi_i_deg"] == phi)]
+    azimuth, tilt = (np.unique(lines[name]) for name in ("phi_o_deg", "theta_o_deg"))
+    values = np.zeros((len(azimuth) + 1, len(tilt)))
+    place = (
+        np.searchsorted(azimuth, lines["phi_o_deg"]),
+        np.searchsorted(tilt, lines["theta_o_deg"]),
+    )
+    values[place] = lines["f_per_sr"]
+    values[-1] = values[0]
+    a, t = np.meshgrid(np.arange(0.125, 360.0, 0.25), np.arange(0.05, 90.0, 0.1), indexing="ij")
+    axes = np.append(azimuth, 360.0), tilt
+    between = RegularGridInterpolator(axes, values)((a, np.clip(t, tilt[0], tilt[-1])))
+    wo = polar(t, a)
+    solid = np.sin(np.radians(t)) * np.radians(0.25) * np.radians(0.1)
+    return wo.reshape(-1, 3), (between * wo[..., 2] * solid).ravel()
+
+
+def test_each_order_of_a_csv_has_the_table_s_light(tmp_path):
+    """Within 1 %, of a turned grating: orders 0.2° wide, nodes 5° apart."""
+    table = thin_grating(1.2, counts=(6, 5, 2), wavelengths=(500.0, 600.0))
+    bsdf = mi.load_dict(md.bsdf_dict(table, orientation=30.0))
+    grid = ExportGrid(np.array([0.0, 30, 60]), np.array([0.0, 60, 240]), np.array([550.0]), 18)
+    scatter.save_csv(bsdf, tmp_path / "s.csv", grid)
+    for theta, phi in LIGHTS:
+        directions, expected = orders_of(table, theta, phi, 550.0, 30.0)
+        wo, power = csv_power(tmp_path / "s.csv", theta, phi)
+        assert power.sum() == pytest.approx(expected.sum(), rel=0.01)
+        np.testing.assert_allclose(by_order(wo, power, directions), expected, rtol=0.01)
+
+
+def test_mirrors_and_narrow_lobes_keep_their_light_in_a_csv(tmp_path):
+    """At the normal, where azimuths of the nodes meet in the lobe, as elsewhere."""
+    grid = ExportGrid(np.array([0.0, 30]), np.array([180.0]), np.array([550.0]), 18)
+    for bsdf in mirrors():
+        scatter.save_csv(bsdf, tmp_path / "s.csv", grid)
+        for theta in (0.0, 30.0):
+            wo, power = csv_power(tmp_path / "s.csv", theta, 180.0)
+            assert near(wo, power, theta) == pytest.approx(lobe_power(bsdf, theta), rel=0.01)
 
 
 def test_bird_s_json_has_f_of_each_pair(tmp_path):

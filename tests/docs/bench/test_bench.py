@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.make.bench import evaluation, figures, frames, scenes
+from docs.make.bench import evaluation, figures, frames, scenes, updates
 from docs.make.bench.__main__ import main
 from docs.make.bench.figures import Goal, Plan, Row, Section
 from tests.support.directions import rough_patch
@@ -33,6 +33,7 @@ def tiny():
         patch.setattr(scenes, "FIREFLY_SPP", TINY.spp)
         patch.setattr(evaluation, "MATERIALS", {"none": evaluation.MATERIALS["none"]})
         patch.setattr(frames, "_SHORTEST", 1e-4)
+        patch.setattr(updates, "CASES", updates.CASES[:1])
         yield
 
 
@@ -50,7 +51,7 @@ def test_everything_is_measured_and_written(measured):
     file, printed = measured
     parts = (
         "build", "survey", "eval", "sample", "eval_pdf", "pdf", "snake", "noise", "efficiency",
-        "colours", "frames",
+        "update", "colours", "frames",
     )  # fmt: skip
     for part in ("processor", "gathers", *(f"{part}:" for part in parts)):
         assert part in printed

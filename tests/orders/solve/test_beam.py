@@ -11,7 +11,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
-from mitsuba_diffraction.orders.solve.profiles import lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 
@@ -42,6 +42,14 @@ def test_light_that_cannot_be_solved_is_refused(options, message):
         solve_orders(sinusoidal(0.6, 0.05), "Al", **options)
 
 
+@pytest.mark.parametrize("material", ["Al", 1.5])
+def test_fewer_harmonics_than_orders_are_refused(material):
+    with pytest.raises(DiffractionError, match="resolution of at least 14"):
+        solve_orders(
+            sinusoidal(8.0, 0.06), material, theta=0.0, settings=replace(GREEN, resolution=12)
+        )
+
+
 def test_efficiencies_of_one_direction_are_those_solved():
     """Also of a few wavelengths, which are narrower than the distance of usual nodes."""
     profile, settings = lamellar(0.376, 0.36, 0.6), Settings((522.0, 542.0))
@@ -63,3 +71,35 @@ def test_efficiencies_of_one_direction_are_those_solved():
         )
         # single precision, and the smooth curve through steps of 4 nm
         np.testing.assert_allclose(got, expected, atol=1e-3)
+
+
+def test_the_resolution_of_one_direction_is_not_that_of_grazing_light():
+    """A station of 25 channels: its grazing light has 1 % from nothing at the first resolution."""
+    profile, settings = blazed(5.0, 0.2), Settings((400.0, 400.0))
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table, finer = (
+            solve_orders(profile, "Al", theta=30.0, settings=replace(settings, resolution=number))
+            for number in (None, 50)
+        )
+    assert table.header["solver"] == "Chandezon's method, 61 harmonics"
+    light = -0.5, 0.0, 400.0, table.response.orders[:, 0]
+    missed = np.abs(table.efficiency(*light) - finer.efficiency(*light)).sum()
+    assert missed < settings.tolerance / 2
+
+
+def test_the_integral_method_solves_an_order_that_leaves_at_grazing():
+    """0.17° from grazing, where 60 points make 2 % of light and 4 % go wrong."""
+    pytest.importorskip("gratinglab")
+    sine = np.sqrt(1.0 - 0.003**2) - 0.55
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table, other = (
+            solve_orders(
+                sinusoidal(1.0, 0.2), "Al", theta=-np.degrees(np.arcsin(sine)),
+                settings=replace(GREEN, method=method),
+            )
+            for method in ("integral", "chandezon")
+        )  # fmt: skip
+    light = sine, 0.0, 550.0, np.arange(-3, 2)
+    missed = np.abs(table.efficiency(*light) - other.efficiency(*light)).sum()
+    # the next resolution changes at most half the tolerance in either
+    assert missed < GREEN.tolerance

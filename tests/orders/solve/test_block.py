@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.orders.solve.orders import solve_orders
-from mitsuba_diffraction.orders.solve.profiles import Profile, lamellar
+from mitsuba_diffraction.orders.solve.profiles import lamellar
 from mitsuba_diffraction.orders.solve.settings import Settings
 
 RANGE, INDEX = (500.0, 560.0), 1.5
@@ -76,12 +76,8 @@ def test_a_block_keeps_all_light_and_sends_it_back_as_it_came():
         (WALLS, "6", SETTINGS, "1.01 to 5"),
         (WALLS, "1.5", Settings(method="integral"), "coupled"),
         (WALLS, "1.5", Settings(polarised=True), "efficiencies alone"),
-        (
-            Profile(np.array([0.0, 0.1, 0.08, 0.3]), np.array([0.0, 0.0, 0.1, 0.1]), 0.4),
-            "1.5", SETTINGS, "undercut",
-        ),
     ],
-)  # fmt: skip
+)
 def test_gratings_that_are_not_solved_are_refused_in_one_line(profile, material, settings, message):
     with pytest.raises(DiffractionError, match=message) as caught:
         solve_orders(profile, material, settings=settings, block=True)

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.orders import solve_orders
-from mitsuba_diffraction.orders.solve.profiles import sinusoidal
+from mitsuba_diffraction.orders.solve.profiles import polygon, sinusoidal
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating
 
@@ -19,9 +19,13 @@ RANGE, INDEX = (500.0, 560.0), 1.5
 SETTINGS = Settings(RANGE, tolerance=0.1, resolution=8)
 
 
+@pytest.mark.parametrize(
+    "profile",
+    [sinusoidal(0.4, 0.05), polygon([(0.0, 0.0), (0.1, 0.06), (0.3, 0.06), (0.2, 0.0)], 0.4)],
+    ids=["sinusoid", "slanted"],
+)
 @pytest.mark.parametrize("from_within", [False, True])
-def test_a_table_is_an_independent_solution_of_the_same_profile(from_within):
-    profile = sinusoidal(0.4, 0.05)
+def test_a_table_is_an_independent_solution_of_the_same_profile(from_within, profile):
     table = solve_orders(profile, INDEX, settings=SETTINGS, block=True)
     # the block below, as a thin sheet's upper side, with channels of the light above
     side = Grating(profile, material_of(INDEX, RANGE), 1.0, RANGE, thin=True)

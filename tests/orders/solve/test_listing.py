@@ -112,7 +112,7 @@ def test_jones_matrices_have_the_efficiencies_of_s_and_p_and_come_back_from_netc
     light = ([520.0, 560.0], [0.0, 40.0], [0.0, 60.0])
     listing = list_orders(table, *light, jones=True)
     shares = list_orders(table, *light, polarised=True).rows[:, 4:]
-    power = (listing.rows[:, 4:] ** 2).reshape(-1, 2, 2, 2).sum(axis=(1, 3))
+    power = (listing.rows[:, 4:12] ** 2).reshape(-1, 2, 2, 2).sum(axis=(1, 3))
     np.testing.assert_allclose(power, shares, atol=2e-4)
     # light comes from (θ, φ): the mirror image has J_sp and J_ps of the other sign
     lam, theta, phi, m = listing.rows[listing.rows[:, 1] > 0.0].T[:4]

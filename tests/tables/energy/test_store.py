@@ -11,6 +11,7 @@ from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy,
 from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.store import VARIABLE
+from tests.support.coarse import COARSE
 
 
 @pytest.fixture
@@ -93,3 +94,27 @@ def test_other_settings_are_another_record(computed):
         use_energy_settings(before)
     energy().at(1.0)
     assert len(computed) == 2
+
+
+def test_what_a_table_keeps_for_the_next_material_changes_no_values():
+    before = use_energy_settings(COARSE)
+    try:
+        assert_albedos_are_those_of_new_tables()
+    finally:
+        use_energy_settings(before)
+
+
+def assert_albedos_are_those_of_new_tables() -> None:
+    table, light = energy().table, (400.0, 700.0)
+
+    def albedo(of: md.DiffractionTable, index: complex, coat: float, scale: float) -> np.ndarray:
+        material = Reflector("small_slope", lambda w: np.full(len(w), index), coat)
+        found = SurfaceEnergy(of, material, scale, light).conservation(light)
+        assert found.albedo is not None
+        return found.albedo.values
+
+    seen = []
+    for asked in ((1.5, 1.0, 1.0), (0.5 + 5.0j, 1.0, 1.0), (1.5, 1.3, 1.0), (1.5, 1.0, 0.5)):
+        seen.append(albedo(table, *asked))
+        assert np.array_equal(seen[-1], albedo(energy().table, *asked))
+    assert not any(np.array_equal(seen[0], other) for other in seen[1:])

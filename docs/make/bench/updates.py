@@ -1,0 +1,90 @@
+"""What one step of an optimisation costs: `parameters.update()` with a value not met before."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.analysis.timing import PIXEL
+from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.tables.store import VARIABLE
+
+from .figures import Goal, Row, Section
+
+#: CPU seconds that an update may take.
+MOST_SECONDS = 0.3
+_PIXELS = 256
+_FILM = {"film_ior": 1.56, "film_thickness": 200.0}
+
+
+class Case(NamedTuple):
+    """A BSDF, one of its parameters, and values of it."""
+
+    name: str
+    arguments: dict[str, Any]
+    parameter: str
+    values: tuple[float, ...]
+
+
+# values of a film that are more than its step of 5 nm apart, heights in intervals of their own
+CASES = (
+    Case("film_thickness, on keratin", _FILM, "film_thickness", (212.0, 224.0, 236.0)),
+    Case("film_thickness, on Al", {"material": "Al", **_FILM}, "film_thickness", (212.0, 224.0)),
+    Case("film_eta, on Al", {"material": "Al", **_FILM}, "film_eta", (1.6, 1.64)),
+    Case("height_scale, Al", {"material": "Al"}, "height_scale", (0.62, 1.37)),
+)
+
+
+def measure_updates(folder: Path, progress: Progress) -> Section:
+    """Update each case's parameter, of which derivatives are taken, with an empty cache."""
+    rows = []
+    with _cache(folder / "updates"):
+        for n, case in enumerate(CASES):
+            progress(n, len(CASES), case.name)
+            rows.append(_measured(case))
+    progress(len(CASES), len(CASES), "updated")
+    title = (
+        f"update: a new value of a parameter, gratings.elaphe_like of {_PIXELS} × {_PIXELS} "
+        "pixels; CPU time, the first use of a parameter left out"
+    )
+    return Section(title, ("CPU s",), rows)
+
+
+def _measured(case: Case) -> Row:
+    field = gratings.elaphe_like(_PIXELS * PIXEL, _PIXELS)
+    parameters = mi.traverse(mi.load_dict(md.bsdf_dict(field, **case.arguments)))
+    seconds = []
+    for value in (float(parameters[case.parameter][0]), *case.values):
+        new = mi.Float(value)
+        dr.enable_grad(new)
+        start = time.process_time()
+        parameters[case.parameter] = new
+        parameters.update()
+        seconds.append(time.process_time() - start)
+    of_new = seconds[1:]
+    goal = Goal(f"at most {MOST_SECONDS:g} s", median(of_new) <= MOST_SECONDS)
+    return Row(case.name, {"CPU s": median(of_new)}, [goal], {"cpu_seconds": of_new})
+
+
+@contextmanager
+def _cache(folder: Path) -> Iterator[None]:
+    """Keep the cache in another folder."""
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = str(folder)
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[VARIABLE]
+        else:
+            os.environ[VARIABLE] = before
