@@ -90,9 +90,16 @@ def passage(through: Number, kept: Number) -> Number:
 
 
 def face_transmittance(cosine: Number, n: Number) -> Number:
-    """Return the transmittance of a face for unpolarised light, for the cosine outside."""
-    s, p = transmittances(cosine, n)
-    return 0.5 * (s + p)
+    """Return the transmittance of a face for unpolarised light, for the cosine outside.
+
+    The mean of T = 4ab/(a + b)² of s and p, a = cosθ or n cosθ (Born and Wolf, section 1.5.3).
+    """
+    xp = of(cosine, n)
+    within = xp.sqrt(xp.maximum(n * n - 1.0 + cosine * cosine, 1e-12))  # n cosθ'
+    scaled = n * n * cosine
+    s, p = cosine + within, scaled + within
+    s, p = s * s, p * p
+    return 2.0 * cosine * within * (p + n * n * s) * xp.reciprocal(s * p)
 
 
 def passed_powers(

@@ -295,7 +295,7 @@ class Lookup:
         return of(within).fma(row.entering, within, mirror)
 
     def _through(self, cosine: Number) -> Number:
-        return face_transmittance(cosine, self.index + 0.0 * cosine)
+        return face_transmittance(cosine, self.index)
 
 
 class BlockRow(NamedTuple):
