@@ -25,5 +25,5 @@ def test_joined_orders_keep_their_places(width: float) -> None:
     lobes = np.exp(-0.5 * ((places[:, None] - orders) / lobe) ** 2)
     exact = lobes @ power / (lobe * np.sqrt(2.0 * np.pi))
     found = density.sum(axis=0) * mixture.pitch
-    # bins are moved by 1/(3σ) at most, at which 0.37 of a lobe lies beside it: here a quarter are
+    # a bin is moved by 1/(3σ) at most, which puts 0.37 of its lobe elsewhere; a third stay in place
     assert np.abs(found - exact).sum() < 0.1 * exact.sum()
