@@ -122,7 +122,10 @@ def listed_response(
 
 
 def _phases(elements: NDArray[np.float32], matrices: Complex) -> NDArray[np.float32]:
-    """Return phases (…) of Jones matrices (…, 4) against those of `_pure`; NaN of NaN."""
+    """Return phases (…) of Jones matrices (…, 4) against those of `_pure`.
+
+    Matrices of NaN have phases of NaN.
+    """
     phases = np.angle((_pure(elements).conj() * matrices).sum(axis=-1))
     return np.where(np.isnan(phases), np.float32(np.nan), phases.astype(np.float32))
 

@@ -153,10 +153,12 @@ def series_sum(
 
     Weights (n, terms), of several κ, give (n, …).
     """
-    if weights.ndim == 1:
-        # not BLAS: OpenBLAS 0.3.31 multiplies an unset number into what it then drops, where single
-        # precision has five terms and the processor AVX-512; NumPy warns of it
-        return np.asarray(np.einsum("...t,t->...", coefficients, weights))
+    if weights.size == weights.shape[-1]:
+        # not by OpenBLAS: with AVX-512, the product of a matrix of five single-precision columns
+        # and a vector also multiplies memory that was never set; the product is right, but NumPy
+        # warns of the invalid operation (version 0.3.31)
+        sums = np.einsum("...t,t->...", coefficients, weights.ravel())
+        return np.asarray(sums.reshape(*weights.shape[:-1], *sums.shape))
     sums = weights @ coefficients.reshape(-1, coefficients.shape[-1]).T
     return np.asarray(sums.reshape(len(weights), *coefficients.shape[:-1]))
 

@@ -22,7 +22,7 @@ FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
 
 _FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
 #: Bins that reach over at most this (in 1/σ) are joined: together they are hardly wider than one
-#: lobe. Over twice of it, orders 1 and −1 of a blazed grating at order 0 made 1.07 of the light.
+#: lobe. Twice as many put orders 1 and −1 of a blazed grating at order 0, and R + T was 1.07.
 _JOINED = 1.0
 #: Distances between samples of a window's power, in 1/σ: in full, and where its lobes are so wide
 #: that smoothing of the samples would widen them.

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import factorial, jv
 
-from mitsuba_diffraction.tables.expansion import Expansion
+from mitsuba_diffraction.tables.expansion import Expansion, series_sum
 
 
 def chebyshev(terms=8, intervals=3, kind="power", kappa_max=30.0):
@@ -98,3 +98,15 @@ def test_taylor_weights_are_powers_over_factorials():
 def test_weights_keep_the_shape_of_kappa():
     assert chebyshev().weights(np.ones((2, 5))).shape == (2, 5, 8)
     assert chebyshev().weights(3.0).shape == (8,)
+
+
+@pytest.mark.parametrize("kappas", [(), (1,), (4,)])
+def test_series_of_all_bins_are_summed_at_each_kappa(kappas):
+    generator = np.random.default_rng(0)
+    coefficients = generator.random((3, 7, 2, 5), np.float32)
+    weights = generator.random((*kappas, 5), np.float32)
+    sums = series_sum(coefficients, weights)
+    exact = np.moveaxis(coefficients.astype(float) @ weights.astype(float).T, -1, 0)
+    expected = exact if kappas else coefficients.astype(float) @ weights.astype(float)
+    assert sums.shape == (*kappas, 3, 7, 2)
+    np.testing.assert_allclose(sums, expected, rtol=1e-6)  # single precision

@@ -1,14 +1,13 @@
-"""What one step of an optimisation costs: `parameters.update()` with a value not met before."""
+"""CPU time of one step of an optimisation: `parameters.update()` with a new value."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
+from unittest import mock
 
 import drjit as dr
 import mitsuba as mi
@@ -28,7 +27,7 @@ _FILM = {"film_ior": 1.56, "film_thickness": 200.0}
 
 
 class Case(NamedTuple):
-    """A BSDF, one of its parameters, and values of it."""
+    """A BSDF by its arguments, and the values that one of its parameters gets in turn."""
 
     name: str
     arguments: dict[str, Any]
@@ -48,7 +47,7 @@ CASES = (
 def measure_updates(folder: Path, progress: Progress) -> Section:
     """Update each case's parameter, of which derivatives are taken, with an empty cache."""
     rows = []
-    with _cache(folder / "updates"):
+    with mock.patch.dict(os.environ, {VARIABLE: str(folder / "updates")}):
         for n, case in enumerate(CASES):
             progress(n, len(CASES), case.name)
             rows.append(_measured(case))
@@ -74,17 +73,3 @@ def _measured(case: Case) -> Row:
     of_new = seconds[1:]
     goal = Goal(f"at most {MOST_SECONDS:g} s", median(of_new) <= MOST_SECONDS)
     return Row(case.name, {"CPU s": median(of_new)}, [goal], {"cpu_seconds": of_new})
-
-
-@contextmanager
-def _cache(folder: Path) -> Iterator[None]:
-    """Keep the cache in another folder."""
-    before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = str(folder)
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[VARIABLE]
-        else:
-            os.environ[VARIABLE] = before

@@ -132,7 +132,7 @@ def check_cell(cell: UnitCell, material: TabulatedIndex, wavelengths: tuple[floa
 
 
 class Folded(NamedTuple):
-    """Azimuths that mirror planes make of others, and how their orders become those of the light.
+    """Azimuths of light mirrored in a grating's mirror planes, and how its orders are mirrored.
 
     Attributes
     ----------
