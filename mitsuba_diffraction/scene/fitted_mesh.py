@@ -26,6 +26,8 @@ STAGE_RADIUS, STAGE_HEIGHT = 4.2, 6.0
 FRAMES = ("none", "still", "turning")
 # Part of the picture's width or height that the mesh fills, and azimuths of a mesh that turns.
 _FILLED, _AZIMUTHS = 0.86, 48
+# Least distance of a camera from the mesh, as a part of its longest side: off the tip of a needle.
+_FREE = 0.1
 # Vertices of the lowest 2 % count as feet: soles and bases are rarely flatter.
 _FEET = 0.02
 # A resting area that is twice as large overrules the convention of the file format.
@@ -129,13 +131,15 @@ def framing(positions: Floats, camera: Floats, tangents: tuple[float, float]) ->
     tangents : of half the angles of view along the first two axes.
 
     Each edge of the picture is a plane through the camera, which the outermost vertex touches: in
-    the camera's axes |x − c_x| ≤ t (z − c_z) for all vertices.
+    the camera's axes |x − c_x| ≤ t (z − c_z) for all vertices. A tip narrower than the angle of
+    view would touch all of them where the camera is: the camera stays a tenth of the mesh away.
     """
     local = positions @ camera
     t = _FILLED * np.array(tangents)
     across, away = local[:, :2], t * local[:, 2:]
     upper, lower = (across - away).max(axis=0), (-across - away).max(axis=0)
-    depth = (-(upper + lower) / (2.0 * t)).min()
+    free = local[:, 2].min() - _FREE * float(np.ptp(local, axis=0).max())
+    depth = min((-(upper + lower) / (2.0 * t)).min(), free)
     return np.asarray(camera @ [*(upper - lower) / 2.0, depth])
 
 
