@@ -16,7 +16,7 @@ from ...extras import optional
 from ...system import cores
 from .scene import VERTEX
 from .source import fragment_parts, plain_source, vertex_source
-from .texels import PAGE, Packed, Texture, Uniform
+from .texels import PAGE, Packed, Texture, Uniform, distinct_rows
 
 #: Required version of OpenGL, 3.3.
 REQUIRED = 330
@@ -104,11 +104,37 @@ def compile_program(
         raise DiffractionError(f"the driver cannot compile method {method}: {words}") from None
 
 
-def vertex_array(context: Any, program: Any, buffer: Any) -> Any:
-    """Return the vertex array of the attributes that a program reads."""
-    names = [name for name, _ in VERTEX if name in program]
-    layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in VERTEX)
-    return context.vertex_array(program, [(buffer, layout, *names)])
+class VertexBuffer:
+    """Uploaded triangles. A vertex that several share is uploaded, and transformed, once.
+
+    vertices : (n, 17), attributes as in `scene.VERTEX`; three consecutive ones are a triangle.
+    """
+
+    def __init__(self, context: Any, vertices: NDArray[np.float32]) -> None:
+        self._context = context
+        distinct, corners = distinct_rows(vertices)
+        self._vertices = context.buffer(distinct.tobytes())
+        self._corners = context.buffer(corners.tobytes())
+
+    def array(self, program: Any) -> Any:
+        """Return the vertex array of the attributes that a program reads."""
+        names = [name for name, _ in VERTEX if name in program]
+        layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in VERTEX)
+        attributes = [(self._vertices, layout, *names)]
+        return self._context.vertex_array(program, attributes, index_buffer=self._corners)
+
+    def release(self) -> None:
+        self._vertices.release()
+        self._corners.release()
+
+
+def enable_sides(context: Any, winding: int) -> None:
+    """Draw with a depth test, and of closed surfaces only triangles that face the camera.
+
+    winding : as in `shadows.Solid`; 0 draws all triangles.
+    """
+    context.cull_face = "back" if winding > 0 else "front"
+    context.enable_only(context.DEPTH_TEST | (context.CULL_FACE if winding else context.NOTHING))
 
 
 def compile_plain(

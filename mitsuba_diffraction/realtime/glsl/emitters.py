@@ -97,8 +97,8 @@ class Emitters:
             for chosen in choices:
                 light = self._sequences[chosen].light(drawn[chosen])
                 share = float(self.probabilities[chosen])
-                density = light.density * (share if light.density > 0.0 else 1.0)
-                lights.append(replace(light, spectrum=light.spectrum / share, density=density))
+                spectrum, density = light.spectrum / share, light.density * share
+                lights.append(replace(light, spectrum=spectrum, density=density))
                 drawn[chosen] += 1
             for number in _nearest_to_mean(np.stack([self._features(light) for light in lights])):
                 yield lights[number]
@@ -196,14 +196,16 @@ class _LightSequence:
         assert self._environment is not None
         of_sun, sunward = self._sun_block(start)
         count = _BLOCK - len(sunward)
-        directions, densities = self._environment.draw(start, count)
+        directions, drawn = self._environment.draw(start, count)
         sky, waves = spectra_along(self.emitter, beside(self._environment.sun, directions))
-        sky = scaled(sky, _BLOCK / count / np.maximum(densities, 1e-12))
+        sky = scaled(sky, _BLOCK / count / np.maximum(drawn, 1e-12))
         # directions of sun and sky alternate evenly
         order = np.argsort(np.argsort(np.arange(_BLOCK) * _GOLDEN % 1.0))
         values = np.concatenate([sky, of_sun])
         directions = np.concatenate([directions, sunward])
-        return values[order], directions[order], np.where(order < count, -1.0, 0.0), waves
+        densities = count / _BLOCK * self._environment.density(directions[:count])
+        looked_up = np.append(densities, np.zeros(len(sunward)))
+        return values[order], directions[order], looked_up[order], waves
 
     def _sun_block(self, start: int) -> tuple[Array, Array]:
         """Draw irradiances and directions of the sun's part of a block; empty without a sun."""

@@ -34,8 +34,8 @@ class Lamp:
     # cutoff and beam of a spot, angles from its axis in rad; None for a point on an area light,
     # whose intensity is proportional to the cosine
     cone: tuple[float, float] | None = None
-    # probability density of a point on an area light, per area; −1 for a direction drawn from an
-    # environment's picture; 0 for lights that lobes do not look up (`surroundings`)
+    # probability density of a point on an area light, per area, or of a direction drawn from an
+    # environment, per solid angle; 0 for lights that lobes do not look up (`surroundings`)
     density: float = 0.0
     shape: int = 0  # address of the area light's shape; 0 for other lights
 

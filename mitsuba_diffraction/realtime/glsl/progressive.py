@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from .camera import Camera
-from .context import Bindings, ShaderPass, Target, compile_plain, set_uniforms, vertex_array
+from .context import Bindings, ShaderPass, Target, VertexBuffer, compile_plain, set_uniforms
 from .emitters import NO_LIGHT
 from .lights import Lamp
 from .packed_scene import PackedScene
@@ -44,7 +44,7 @@ class Stage:
     Raises a DiffractionError if no emitter lights the scene, or the environment is not finite.
     """
 
-    def __init__(self, context: Any, packed: PackedScene, buffers: list[Any]) -> None:
+    def __init__(self, context: Any, packed: PackedScene, buffers: list[VertexBuffer]) -> None:
         self.context, self._packed, self._scene = context, packed, packed.scene
         self._bounces: Bindings | None = None
         self._resources: list[Any] = []
@@ -73,12 +73,12 @@ class Stage:
         bindings: Bindings = self._register(Bindings(self.context, packed))
         return bindings
 
-    def _add_glowing(self, buffers: list[Any]) -> None:
+    def _add_glowing(self, buffers: list[VertexBuffer]) -> None:
         """Add shapes that emit light, both as pictures and as shadow casters."""
         context, scene = self.context, self._scene
         self._glow = self._register(compile_plain(context, "surface.vert", "glow.frag"))
-        vertices = [self._register(context.buffer(g.vertices.tobytes())) for g in scene.emitting]
-        self._glowing = [self._register(vertex_array(context, self._glow, v)) for v in vertices]
+        vertices = [self._register(VertexBuffer(context, g.vertices)) for g in scene.emitting]
+        self._glowing = [self._register(v.array(self._glow)) for v in vertices]
         self.casters = self._register(Casters(context, scene.surfaces, buffers, vertices))
 
     def extras(self, bounces: bool) -> list[list[Bindings]]:
@@ -192,7 +192,7 @@ class ProgressiveLight:
     def _look_up(self, camera: Camera, numbers: Array) -> None:
         """Draw the surroundings that each pixel's lobes look up."""
         uniforms: dict[str, Uniform] = {"sequence": tuple(numbers.tolist())}
-        each: list[dict[str, Uniform]] = [{} for _ in self._visible.solid]
+        each: list[dict[str, Uniform]] = [{} for _ in self._visible.windings]
         self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, each, {})
 
     def _draw_surfaces(
@@ -205,11 +205,11 @@ class ProgressiveLight:
         textures: dict[str, Any],
     ) -> None:
         """Draw all surfaces with the definitions, uniforms and textures of a kind of frame."""
-        for surface, solid in zip(each, self._visible.solid, strict=True):
-            surface["solid"] = solid
+        for surface, winding in zip(each, self._visible.windings, strict=True):
+            surface["solid"] = winding != 0
         self._draw(
             self._frame.frame, camera, [light], definitions, uniforms, self._surroundings, each,
-            textures,
+            textures, self._visible.windings,
         )  # fmt: skip
 
     @property

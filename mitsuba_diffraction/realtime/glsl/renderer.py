@@ -14,12 +14,13 @@ from .camera import Camera
 from .context import (
     Bindings,
     Target,
+    VertexBuffer,
     bind,
     check_version,
     compile_program,
+    enable_sides,
     headless_context,
     set_uniforms,
-    vertex_array,
 )
 from .lights import Lamp
 from .packed_scene import PackedScene
@@ -62,7 +63,7 @@ class Renderer:
         self._own_context = context is None
         self.context = headless_context() if context is None else context
         check_version(self.context)
-        self.buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
+        self.buffers = [VertexBuffer(self.context, s.vertices) for s in self.scene.surfaces]
         self.bindings = [Bindings(self.context, s.packed) for s in self.packed.surfaces]
         self._tables: dict[str, list[Bindings]] = {}
         self._programs: dict[object, Any] = {}
@@ -180,6 +181,7 @@ class Renderer:
         extras: Sequence[Sequence[Bindings]] = (),
         each: Sequence[dict[str, Uniform]] = (),
         textures: Mapping[str, Any] | None = None,
+        windings: Sequence[int] = (),
     ) -> None:
         """Draw some lights, or looked-up surroundings, into a framebuffer.
 
@@ -189,10 +191,10 @@ class Renderer:
         lights : lights without extent.
         definitions, uniforms, textures : definitions, uniforms and textures of the light.
         extras, each : further bindings, and uniforms, of each surface.
+        windings : of each surface whose triangles that face away are hidden; 0 for others.
         """
         tables = self.tables(method)
         frame.use()
-        self.context.enable_only(self.context.DEPTH_TEST)
         matrix = camera.view_projection(self.scene.low, self.scene.high)
         places = np.zeros((LIGHTS, 4), np.float32)
         colours = np.zeros((LIGHTS, 3), np.float32)
@@ -224,6 +226,7 @@ class Renderer:
             if (diffraction := surface.material.diffraction) is not None:
                 height_scale = diffraction.described.height_scale.number
                 set_uniforms(program, {"height_scale": height_scale})
+            enable_sides(self.context, windings[n] if windings else 0)
             array.render()
 
     def release(self) -> None:
@@ -269,9 +272,7 @@ class Renderer:
         if key not in self._programs:
             self._programs[key] = compile_program(self.context, method, definitions)
         if (number, key) not in self._arrays:
-            self._arrays[number, key] = vertex_array(
-                self.context, self._programs[key], self.buffers[number]
-            )
+            self._arrays[number, key] = self.buffers[number].array(self._programs[key])
         return self._programs[key], self._arrays[number, key]
 
     def use_responses(self, program: Any, unit: int, lights: Sequence[Lamp] | None = None) -> None:

@@ -20,7 +20,7 @@ import scipy
 from numpy.typing import NDArray
 
 from .camera import Camera, box_corners
-from .context import Target, compile_plain, set_uniforms, vertex_array
+from .context import Target, VertexBuffer, compile_plain, enable_sides, set_uniforms
 from .lights import Lamp
 from .scene import SceneSurface
 from .texels import Uniform
@@ -47,7 +47,7 @@ class Visible:
 
     places: Array  # (n, 3) visible points, on a coarse grid of pixels
     outline: Array  # (m, 3) corners of their convex hull
-    solid: list[bool]  # for each surface, whether it is closed and seen from outside
+    windings: list[int]  # of each closed surface that is seen from outside; 0 for others
 
 
 @dataclass(frozen=True)
@@ -83,13 +83,13 @@ class Casters:
         self,
         context: Any,
         surfaces: Sequence[SceneSurface],
-        buffers: Sequence[Any],
-        emitting: Sequence[Any] = (),
+        buffers: Sequence[VertexBuffer],
+        emitting: Sequence[VertexBuffer] = (),
     ) -> None:
         self.context = context
         self.program = compile_plain(context, "surface.vert", "position.frag")
-        self._arrays = [vertex_array(context, self.program, buffer) for buffer in buffers]
-        self._emitting = [vertex_array(context, self.program, buffer) for buffer in emitting]
+        self._arrays = [buffer.array(self.program) for buffer in buffers]
+        self._emitting = [buffer.array(self.program) for buffer in emitting]
         vertices = [s.vertices[:, :6].reshape(-1, 3, 6).astype(np.float64) for s in surfaces]
         self._shapes = [int(s.shape.ptr) for s in surfaces]
         self.solids = [Solid.analyse(v[..., :3], v[..., 3:]) for v in vertices]
@@ -112,16 +112,16 @@ class Casters:
         """
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         parts = [
-            "none" if shape == light.shape else _needed(solid, light, outside)
-            for solid, outside, shape in zip(self.solids, visible.solid, self._shapes, strict=True)
+            "none" if shape == light.shape else _needed(solid, light, winding != 0)
+            for solid, winding, shape in zip(
+                self.solids, visible.windings, self._shapes, strict=True
+            )
         ]
         for array, solid, part in zip(self._arrays, self.solids, parts, strict=True):
             if part == "none":
                 continue
             # the map looks along its z axis, which reverses the triangles' orientation
-            self.context.cull_face = "back" if solid.winding > 0 else "front"
-            culled = self.context.CULL_FACE if part == "away" else self.context.NOTHING
-            self.context.enable_only(self.context.DEPTH_TEST | culled)
+            enable_sides(self.context, solid.winding if part == "away" else 0)
             array.render()
         self.context.enable_only(self.context.DEPTH_TEST)
         if light.place[3] == 0.0:
@@ -143,8 +143,8 @@ class Casters:
         pixels = target.read()[::-1].reshape(-1, 4).astype(float)
         target.release()
         places = np.asarray(pixels[pixels[:, 3] > 0.0, :3], np.float64)
-        solid = [s.winding != 0 and not s.encloses(camera.eye) for s in self.solids]
-        return Visible(places, outline(places), solid)
+        windings = [0 if s.encloses(camera.eye) else s.winding for s in self.solids]
+        return Visible(places, outline(places), windings)
 
     def release(self) -> None:
         for thing in (*self._arrays, *self._emitting, self.program):
@@ -218,7 +218,7 @@ class ShadowMap:
                 light.place[:3], visible.outline, self.casters.corners, self.size, shift
             )
         else:
-            matrix, scale = self._perspective(light.place[:3], visible.places, shift)
+            matrix, scale = self._perspective(light.place[:3], visible, shift)
         self._frame.use()
         self._frame.clear(depth=1.0)
         biases = self.casters.draw_map(matrix, light, visible)
@@ -235,15 +235,17 @@ class ShadowMap:
         return shared, [{"shadow_bias": bias * scale} for bias in biases]
 
     def _perspective(
-        self, eye: Array, places: Array, shift: tuple[float, float]
+        self, eye: Array, visible: Visible, shift: tuple[float, float]
     ) -> tuple[Array, float]:
         """Return the perspective view from a point, as `parallel_view`, its scale at distance 1."""
-        away = places - eye
-        away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
-        mean = away.mean(axis=0)
-        axes = frame_along(mean / max(float(np.linalg.norm(mean)), 1e-12))
-        ahead = away @ axes[2]
-        inside = ahead > _WIDEST
+        for places in (visible.outline, visible.places):  # corners suffice if all lie ahead
+            away = places - eye
+            away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+            mean = away.mean(axis=0)
+            axes = frame_along(mean / max(float(np.linalg.norm(mean)), 1e-12))
+            inside = away @ axes[2] > _WIDEST
+            if inside.all():
+                break
         covered = away[inside] if inside.any() else axes[2:]
         projected = covered @ axes[:2].T / (covered @ axes[2])[:, None]
         low, high = _bounds(projected, self.size, shift)

@@ -157,19 +157,36 @@ class Environment:
         phi = 2.0 * np.pi * (column[texel] + across) / columns
         return _directions(np.arccos(cosine), phi), probability / self.areas[row[texel], 0]
 
+    @property
+    def total(self) -> float:
+        """Radiance of all channels over the whole sphere."""
+        return float((self.picture.sum(axis=2) * self.areas).sum())
+
+    def density(self, directions: Array) -> Array:
+        """Return the probability density (n,) of drawn unit vectors (n, 3) per solid angle.
+
+        It follows the picture interpolated between texels, which shaders look up along lobes.
+        """
+        rows, columns, _ = self.picture.shape
+        theta = np.arccos(np.clip(directions[:, 2], -1.0, 1.0))
+        phi = np.arctan2(directions[:, 1], directions[:, 0]) % (2.0 * np.pi)
+        around = np.pad(self.picture.sum(axis=2), [(0, 0), (1, 1)], mode="wrap")
+        place = [rows * theta / np.pi - 0.5, columns * phi / (2.0 * np.pi) + 0.5]
+        found = scipy.ndimage.map_coordinates(around, place, np.float64, order=1, mode="nearest")
+        return np.asarray(found / max(self.total, 1e-30))
+
     def packed(self, share: float) -> Packed:
         """Pack the environment for shaders/surroundings.glsl.
 
         share : probability of lights drawn from the environment.
         """
         rows, columns, _ = self.picture.shape
-        total = float((self.picture.sum(axis=2) * self.areas).sum())
         four = np.concatenate([self.picture, np.zeros((rows, columns, 1), np.float32)], axis=2)
         cosine = np.cos(_SUN_RADIUS) if self.sun.any() else 2.0
         return Packed(
             (Texture("environment", as_half(four), smooth=True),),
             {
-                "environment_density": share / total if total > 0.0 else 0.0,
+                "environment_density": share / self.total if self.total > 0.0 else 0.0,
                 "sun": (*self.sun.tolist(), float(cosine)),
                 "sun_radiance": tuple(self.sun_radiance.tolist()),
             },

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ PAGE = 1 << 12
 #: Largest relative error of a sum of coefficients for which half floats are used.
 HALF_ERROR = 2e-4
 _SAMPLED = 1 << 20  # numbers from which that error is estimated
+
+Number = TypeVar("Number", bound=np.generic)
 
 #: Value of a uniform: number, vector, or array of vectors (n, components) of single precision.
 Uniform = float | int | bool | tuple[float, ...] | tuple[int, ...] | NDArray[np.float32]
@@ -149,3 +151,15 @@ def plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [plain(v) for v in value]
     return value.item() if isinstance(value, np.generic) else value
+
+
+def distinct_rows(rows: NDArray[Number]) -> tuple[NDArray[Number], NDArray[np.uint32]]:
+    """Return distinct rows (m, k) in the order of their first occurrence, and each row's place.
+
+    The order keeps neighbours together, so that differences between them are small.
+    """
+    whole = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1])))
+    _, first, inverse = np.unique(whole.ravel(), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.argsort(order).astype(np.uint32)
+    return rows[first[order]], rank[inverse.ravel()]

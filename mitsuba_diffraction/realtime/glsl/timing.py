@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .context import clock_of, compile_program, set_uniforms, vertex_array
+from .context import VertexBuffer, clock_of, compile_program, set_uniforms
 from .renderer import Renderer
 from .source import LIGHTS
 from .texels import Uniform
@@ -48,7 +48,7 @@ def _seconds(renderer: Renderer, array: Any, bind: Callable[[], object]) -> floa
     renderer.context.enable_only(renderer.context.NOTHING)  # no depth test
     bind()
     target.frame.viewport = (0, 0, 8, 8)
-    array.render(vertices=3)
+    array.render()
     renderer.context.finish()
     target.frame.viewport = (0, 0, SIDE, SIDE)
     clock = clock_of(renderer.driver)
@@ -56,7 +56,7 @@ def _seconds(renderer: Renderer, array: Any, bind: Callable[[], object]) -> floa
     while True:
         start = clock()
         for _ in range(times):
-            array.render(vertices=3)
+            array.render()
         renderer.context.finish()
         seconds = clock() - start
         if seconds >= _SHORTEST:
@@ -80,7 +80,7 @@ def _triangle(renderer: Renderer, method: str) -> tuple[Any, Callable[[], object
     vertices[:, 3:9] = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
     vertices[:, 9:11] = 0.5 * (corners + 1.0)
     vertices[:, 11:] = [0.1, 0.1, 0.1, 1.0, 0.0, 1.0]
-    buffer = renderer.context.buffer(vertices.tobytes())
+    buffer = VertexBuffer(renderer.context, vertices)
     uniforms: dict[str, Uniform] = {
         "view_projection": tuple(np.eye(4).ravel().tolist()), "eye": _EYE,
         "light_place": np.array([_LIGHT] * LIGHTS, np.float32),
@@ -91,5 +91,5 @@ def _triangle(renderer: Renderer, method: str) -> tuple[Any, Callable[[], object
         set_uniforms(program, uniforms)
         renderer.use_responses(program, tables.use(program, surface.use(program)))
 
-    array = vertex_array(renderer.context, program, buffer)
+    array = buffer.array(program)
     return array, bind, (array, program, buffer)

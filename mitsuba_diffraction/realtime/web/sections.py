@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import encode_srgb
 from ..glsl.scene import VERTEX
-from ..glsl.texels import Packed, Texture, plain
+from ..glsl.texels import Packed, Texture, distinct_rows, plain
 
 _LEVEL = 9
 _ROWS = (1, 2, 3, 4, 6, 8, 12)  # rows that may stand in one
@@ -138,7 +138,7 @@ def packed_mesh(vertices: NDArray[np.float32], sections: Sections) -> dict[str, 
         columns.append(np.round(whole).astype(np.uint16))
         layout[name] = {"column": width, "low": low.tolist(), "step": steps.tolist()}
         width += values.shape[1]
-    distinct, corners = _distinct(np.concatenate(columns, axis=1))
+    distinct, corners = distinct_rows(np.concatenate(columns, axis=1))
     arrays: dict[str, Any] = {"columns": distinct, "corners": corners[:, None]}
     if flat:
         arrays["tangents"] = by_triangle[:, 0]
@@ -160,18 +160,6 @@ def octahedral(directions: NDArray[np.floating]) -> NDArray[np.int16]:
     result = np.round(plane * _UNIT).astype(np.int16)
     result[~nonzero] = _NO_DIRECTION
     return result
-
-
-def _distinct(rows: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
-    """Return distinct rows in the order of their first occurrence, and the index of each row.
-
-    The order keeps neighbours together, so that differences between them are small.
-    """
-    whole = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1])))
-    _, first, inverse = np.unique(whole.ravel(), return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.argsort(order).astype(np.uint32)
-    return rows[first[order]], rank[inverse.ravel()]
 
 
 def converted(packed: Packed, functions: Mapping[str, Callable[[Any], Any]]) -> Packed:

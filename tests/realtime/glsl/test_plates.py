@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.realtime.glsl.context import VertexBuffer
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.lanes import interaction, spectra, vectors
@@ -40,15 +41,17 @@ def test_what_lies_beneath_gets_the_light_that_the_table_leaves(
 
 def pigment_of(gl: Any, plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
     """What a plate's shader adds for a white pigment beneath, over the light's irradiance."""
-    made = Renderer(mi.load_dict(under_a_sun(plate, wo)), context=gl)
-    (surface,), (buffer,) = made.scene.surfaces, made.buffers
-    vertices, pictures = surface.vertices.copy(), []
+    scene, pictures = mi.load_dict(under_a_sun(plate, wo)), []
     for pigment in (1.0, 0.0):
+        made = Renderer(scene, context=gl)
+        vertices = made.scene.surfaces[0].vertices.copy()
         vertices[:, COLOUR] = pigment
-        buffer.write(vertices.tobytes())
+        made.buffers[0].release()
+        made.buffers[0] = VertexBuffer(gl, vertices)
         pictures.append(made.render("exact", supersampling=1)[1, 1, :3].astype(float))
-    found = (pictures[0] - pictures[1]) / made.lights[0].colour
-    made.release()
+        colour = made.lights[0].colour
+        made.release()
+    found = (pictures[0] - pictures[1]) / colour
     return np.asarray(found)
 
 

@@ -214,9 +214,6 @@ void main()
         float share = 1.0;
 #ifdef WEIGHTED
         float drawn = light_density * square / max(emitted(direction), 1e-6);
-#ifdef ENVIRONMENT
-        if (light_density < 0.0) drawn = density_of_environment(environment_radiance(direction));
-#endif
         if (light_density != 0.0) share = drawn / max(drawn + lobe_density(wi, wo, rotation), 1e-20);
 #endif
         added += share * lobes(wi, wo, rotation, i);

@@ -18,8 +18,6 @@ vec3 environment_radiance(vec3 direction)
     float row = clamp(acos(clamp(direction.z, -1.0, 1.0)) / PI, 0.5 / rows, 1.0 - 0.5 / rows);
     return texture(environment, vec2(turn_of(direction.xy), row)).rgb;
 }
-
-float density_of_environment(vec3 radiance) { return environment_density * dot(radiance, vec3(1.0)); }
 #endif
 
 #ifdef FLATS
@@ -37,7 +35,7 @@ vec4 arriving(vec3 position, vec3 direction, out float nearest)
     vec4 found = vec4(0.0);
 #ifdef ENVIRONMENT
     found.rgb = environment_radiance(direction);
-    found.w = density_of_environment(found.rgb);
+    found.w = environment_density * dot(found.rgb, vec3(1.0));
 #ifdef MIRROR
     if (dot(direction, sun.xyz) > sun.w) found.rgb += sun_radiance;
 #endif

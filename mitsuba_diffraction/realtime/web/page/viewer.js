@@ -135,7 +135,7 @@ class Viewer {
     const shown = [lights.kind === "scene" ? 1 : 0, lights.whole ? 1 : 0];
     // only light that lobes look up shares them with lights drawn
     const density = (looksUp && chosen[0]?.density) || 0;
-    if (!lookup) view.uniforms.light_density = density > DOME && !shown[1] ? 0 : density;
+    if (!lookup) view.uniforms.light_density = chosen[0]?.place[3] && !shown[1] ? 0 : density;
     Object.assign(view.uniforms, { surroundings_lit: shown, dome: [...this.camera.up, lights.dome] });
     const lit = this.lit[lookup ? "lookup" : one ? "one" : moving ? "glance" : "few"], bright = lookup || !(one && looksUp);
     this.sample = { ...view, method, width, height, preview, moving, detail, lit, around, looksUp: looksUp && one, lookup, bright, row: 0, time: 0 };
