@@ -46,7 +46,7 @@ def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
     """
     positions, normals, uv, faces, _ = _arrays(Path(path))[0]
     if normals is None:
-        normals = vertex_normals(positions, faces)
+        normals = vertex_normals(positions, faces, uv)
     return SmoothMesh(positions, normals, uv, faces)
 
 

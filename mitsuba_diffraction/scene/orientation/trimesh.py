@@ -73,22 +73,26 @@ def across(corners: Floats) -> Floats:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def vertex_normals(positions: Floats, faces: Ints) -> Floats:
+def vertex_normals(positions: Floats, faces: Ints, uv: Floats | None = None) -> Floats:
     """Return smooth unit normals (n, 3): the mean over the triangles at a vertex.
 
     Triangles count by their angles there (Thürmer and Wüthrich 1998, *Computing vertex normals from
-    polygonal facets*), so that it does not matter how a polygon is cut. Vertices at one place, as
-    along seams of the texture, share their normals where these differ by less than `CREASE`.
+    polygonal facets*), so that it does not matter how a polygon is cut. Vertices at one place with
+    one texture coordinate are one vertex. Others at one place, as along seams of the texture, share
+    their normals where these differ by less than `CREASE`.
     """
-    corners, own = positions[faces], np.zeros_like(positions)
+    keys = positions if uv is None else np.concatenate([positions, uv], axis=1)
+    distinct, vertex = np.unique(keys, axis=0, return_inverse=True)
+    vertex = vertex.reshape(-1)
+    corners, own = positions[faces], np.zeros((len(distinct), 3))
     with np.errstate(invalid="ignore", over="ignore"):  # readers refuse what is not finite
         front = unit(across(corners))
         for n in range(3):
             one, other = (unit(corners[:, (n + k) % 3] - corners[:, n]) for k in (1, 2))
             angle = np.arccos(np.clip((one * other).sum(axis=1, keepdims=True), -1.0, 1.0))
-            np.add.at(own, faces[:, n], angle * front)
-    total = _shared(own, np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1))
-    return np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])
+            np.add.at(own, vertex[faces[:, n]], angle * front)
+    total = _shared(own, np.unique(distinct[:, :3], axis=0, return_inverse=True)[1].reshape(-1))
+    return np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])[vertex]
 
 
 def _shared(normals: Floats, places: Ints) -> Floats:

@@ -156,6 +156,10 @@ def write_cube(file: Path) -> None:
             f"    int[] faceVertexIndices = {[corner for side in SIDES for corner in side]}\n"
             f"    point3f[] points = [{listed}]\n}}\n"
         )
+    elif file.suffix == ".obj":  # each polygon has corners of its own
+        rows = [("v", *CORNERS[corner]) for side in SIDES for corner in side]
+        rows += [("f", *range(first, first + 4)) for first in range(1, 25, 4)]
+        text = "\n".join([*(" ".join(map(str, row)) for row in rows), ""])
     else:
         head = ["ply", "format ascii 1.0", "element vertex 8"]
         head += [f"property float {axis}" for axis in "xyz"]
@@ -165,7 +169,7 @@ def write_cube(file: Path) -> None:
     file.write_text(text, encoding="utf-8")
 
 
-@pytest.mark.parametrize("suffix", [".usda", ".ply"])
+@pytest.mark.parametrize("suffix", [".usda", ".ply", ".obj"])
 def test_meshes_without_normals_get_smooth_ones(
     tmp_path: Path, suffix: str, some_variant: str
 ) -> None:
