@@ -85,7 +85,7 @@ def test_the_report_says_what_is_needed_and_what_it_changes(planned):
     assert 0.9 * 5.97 < along_x < 1.1 * 5.97
     assert along_y < along_x
     assert table["planned"]["memory_mb"] < 0.8 * table["whole"]["memory_mb"]
-    assert table["needs"]["share of the light outside, which is missing"] <= report["tolerance"]
+    assert table["needs"]["share of the light outside, at most"] <= report["tolerance"]
     low, high = table["asked for"]["wavelengths of 99.9 %"]["range_nm"]
     assert 360.0 < low < 420.0
     assert 650.0 < high < 720.0
@@ -109,7 +109,7 @@ def test_a_picture_lacks_at_most_the_share_of_light_that_the_plan_states(run, fo
     arguments = ["plan", folder / "foil.xml", "-o", plan, "--json", report, *PATHS]
     assert main([str(a) for a in (*arguments, "--plan-tolerance", 0.1)]) == 0
     (table,) = json.loads(report.read_text())["tables"]
-    stated = table["needs"]["share of the light outside, which is missing"]
+    stated = table["needs"]["share of the light outside, at most"]
     brightness = []
     for option in ((), ("--plan", plan)):
         out = folder / "less.exr"

@@ -45,16 +45,21 @@ def write_page(path: Path, text: str) -> list[Path]:
 def separated(text: str, stem: str) -> tuple[str, dict[str, str]]:
     """Return a page with links in place of its long tables, and the CSV files by name.
 
+    A page with generated parts keeps the tables outside of them, which are written by hand.
+
     stem : beginning of the files' names; the heading or generated part of a table follows.
     """
     tables: dict[str, str] = {}
+    has_parts = "<!-- begin " in text
 
     def replace(match: re.Match[str]) -> str:
         lines = match[0].strip().splitlines()
         rows = [_cells(line) for n, line in enumerate(lines) if n != 1]
-        if len(rows) <= LONG:
+        before = text[: match.start()]
+        by_hand = has_parts and before.rfind("<!-- begin ") <= before.rfind("<!-- end ")
+        if len(rows) <= LONG or by_hand:
             return match[0]
-        titles = _TITLE.findall(text[: match.start()]) or [stem]
+        titles = _TITLE.findall(before) or [stem]
         words = re.sub(r"[^a-z0-9]+", "-", titles[-1].lower()).strip("-")
         name, number = f"{stem}-{words}.csv", 1
         while name in tables:

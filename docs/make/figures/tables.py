@@ -204,7 +204,7 @@ def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
         ("series in κ, terms", str(whole["terms"]), str(planned["terms"])),
         ("table", *(f"{figures['memory_mb']:.2g} MB" for figures in (whole, planned))),
     ]
-    missing = needs["share of the light outside, which is missing"]
+    missing = needs["share of the light outside, at most"]
     change = f"and at most {100 * missing:.2g} % of the light from the skin is missing"
     less = table["times less memory"]
     return {

@@ -48,7 +48,7 @@ def describe(planned: PlannedTable) -> dict[str, Any]:
             "frequency (rad/µm), along x and y": list(planned.table.frequency_limit),
             "height_scale_max": planned.table.height_scale_max,
             "kappa (rad/µm)": planned.table.expansion.kappa_max,
-            "share of the light outside, which is missing": planned.outside,
+            "share of the light outside, at most": planned.outside,
         },
         "whole": whole,
         "planned": _figures(planned.table),

@@ -30,3 +30,13 @@ def test_a_short_table_stays(tmp_path):
     text = page_of(LONG - 1)
     assert write_page(tmp_path / "page.md", text) == [tmp_path / "page.md"]
     assert (tmp_path / "page.md").read_text(encoding="utf-8") == text
+
+
+def test_a_table_outside_of_the_generated_parts_stays(tmp_path):
+    by_hand, made = page_of(LONG), page_of(LONG).replace("case", "row")
+    text = f"{by_hand}<!-- begin figures -->\n{made}<!-- end figures -->\n{by_hand}"
+    assert len(write_page(tmp_path / "page.md", text)) == 2
+    shown = (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert shown.count(by_hand) == 2
+    assert "Table of" in shown
+    assert "| `row 0`" not in shown
