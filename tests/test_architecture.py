@@ -6,13 +6,15 @@ import ast
 import re
 from collections import Counter
 from functools import cache
+from pathlib import Path
 
 import pytest
 
+import mitsuba_diffraction
 from tests.support import ROOT
 
 PAGE = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
-PACKAGE = ROOT / "mitsuba_diffraction"
+PACKAGE = Path(mitsuba_diffraction.__file__).parent
 _, _, AFTER = PAGE.partition("## One load, one eval, one change of a parameter")
 STEPS = re.findall(r"^\d+\. .*", AFTER.partition("\n## ")[0], re.M)
 
@@ -56,7 +58,7 @@ def test_each_way_has_ten_steps():
 
 
 def test_files_exist():
-    folders = (ROOT, PACKAGE)
+    folders = (ROOT, PACKAGE.parent, PACKAGE)
     for name in re.findall(r"`([\w/.]+\.(?:py|md))`", PAGE):
         assert any((folder / name).exists() for folder in folders), name
 
