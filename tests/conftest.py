@@ -32,6 +32,8 @@ pytest_plugins = ["tests.support.processor_time"]
 def pytest_configure(config: pytest.Config) -> None:
     """Allow the package's own warnings, which follow from a test's surface; others are errors."""
     config.addinivalue_line("filterwarnings", "ignore::mitsuba_diffraction.DiffractionWarning")
+    if config.getoption("hypothesis_profile", None) is None:
+        same_cases_in_every_run()
 
 
 _THOROUGH = re.compile(r"^pytestmark = \[?\s*pytest\.mark\.thorough", re.M)
@@ -76,6 +78,17 @@ _BUSY = {
 hypothesis.settings.register_profile("search", **_BUSY)
 hypothesis.settings.register_profile("tests", **_BUSY, derandomize=True, database=None)
 hypothesis.settings.load_profile("tests")
+
+
+def same_cases_in_every_run() -> None:
+    """Keep Hypothesis from trying constants of the modules that other tests happen to import.
+
+    It has no setting for it. In versions that lack the function, a run's cases vary.
+    """
+    module = "hypothesis.internal.conjecture.providers"
+    if hasattr(sys.modules.get(module), "is_local_module_file"):
+        sys.modules[module].is_local_module_file = lambda file: False  # type: ignore[attr-defined]
+
 
 _frozen: tuple[Path, int] | None = None
 
