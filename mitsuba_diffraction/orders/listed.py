@@ -122,7 +122,7 @@ def listed_response(
 
 
 def _phases(elements: NDArray[np.float32], matrices: Complex) -> NDArray[np.float32]:
-    """Return phases (…) of Jones matrices (…, 4) against those of `_pure`.
+    """Return phases (…) of Jones matrices (…, 4) relative to the matrices of `_pure`.
 
     Matrices of NaN have phases of NaN.
     """

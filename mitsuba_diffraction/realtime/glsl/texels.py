@@ -21,7 +21,7 @@ PAGE = 1 << 12
 HALF_ERROR = 2e-4
 _SAMPLED = 1 << 20  # numbers from which that error is estimated
 
-Number = TypeVar("Number", bound=np.generic)
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 #: Value of a uniform: number, vector, or array of vectors (n, components) of single precision.
 Uniform = float | int | bool | tuple[float, ...] | tuple[int, ...] | NDArray[np.float32]
@@ -153,7 +153,7 @@ def plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def distinct_rows(rows: NDArray[Number]) -> tuple[NDArray[Number], NDArray[np.uint32]]:
+def distinct_rows(rows: NDArray[Scalar]) -> tuple[NDArray[Scalar], NDArray[np.uint32]]:
     """Return distinct rows (m, k) in the order of their first occurrence, and each row's place.
 
     The order keeps neighbours together, so that differences between them are small.
