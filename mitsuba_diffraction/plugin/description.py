@@ -139,8 +139,8 @@ class Surface:
     model : name of the boundary model; empty for solved orders.
     energy_scale : scale s of directions and wavelengths as a function of the height scale, on
         `tables.directional.FINE`; None where all are 1. The BSDF is multiplied by s(ωi) s(ωo).
-    reflected : likewise, albedo over the flat interface's reflectance, by which light goes on to a
-        nested BSDF; None where the flat reflectance decides.
+    albedo_excess : likewise, albedo less the flat interface's reflectance, by which light goes on
+        to a nested BSDF; None where the flat reflectance decides.
     nested : the BSDF beneath, or None.
     shadowing : whether grooves shadow each other (`vcavity`).
     transmits : whether light goes through.
@@ -164,7 +164,7 @@ class Surface:
     coat: float | None = None
     model: str = ""
     energy_scale: Callable[[float], DirectionalTable | None] = unscaled
-    reflected: Callable[[float], DirectionalTable | None] = unscaled
+    albedo_excess: Callable[[float], DirectionalTable | None] = unscaled
     nested: BSDF | None = None
     shadowing: bool = False
     transmits: bool = False

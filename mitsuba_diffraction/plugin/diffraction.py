@@ -308,13 +308,13 @@ class Diffraction(DiffractingSurface):
         return site.scale if self.coat is None else site.scale * self.coat.eta
 
     def beneath(self, site: Site, wo: Vector3f, active: Mask) -> Colour:
-        """See `SurfaceBSDF.beneath`: T = 1 − a, with a the flat reflectance times a smooth ratio.
+        """See `SurfaceBSDF.beneath`: T = 1 − a, a the flat reflectance plus a smooth difference.
 
         a is the albedo of the diffraction, so that what is not reflected goes on, and a white pair
         reflects at most what it gets.
         """
         inwards, outwards = (
-            dr.maximum(1.0 - self.energy.reflected(w, site) * flat, 0.0)
+            dr.clip(1.0 - self.energy.albedo_excess(w, site) - flat, 0.0, 1.0)
             for w in (site.si.wi, wo)
             for flat in [self.fresnel.reflectance(mi.Frame3f.cos_theta(w), site.si, active)]
         )
@@ -354,7 +354,7 @@ class Diffraction(DiffractingSurface):
             shadowing=self.vcavity,
             # shaders have no scale under a coat, where it is near 1
             energy_scale=unscaled if self.coat is not None else energy.scale,
-            reflected=energy.ratio,
+            albedo_excess=energy.excess,
         )
 
     def shown(self) -> dict[str, Any]:

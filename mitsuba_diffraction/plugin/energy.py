@@ -33,13 +33,11 @@ from .materials import Dielectric, IndexAt
 from .types import Colour, Float, Interaction, Vector3f
 
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
-#: rarely and sees s and the ratio of albedos as constants.
+#: rarely and sees s and the albedo's excess as constants.
 INDEX_STEP, COAT_STEP, DIELECTRIC_STEP = 0.05, 0.01, 0.002
 #: Largest change of a film's fringe by rounding its index, rad: at grazing angles light that a film
 #: guides gains several times, within narrow fringes.
 FILM_PHASE = 0.02
-#: Largest ratio of a film's albedo to that of the flat one.
-MOST_RATIO = 2.0
 
 #: Material of a surface, or materials evenly along its `place`, from the factor on its lengths
 #: (`ScaleRange.centre`) and wavelengths, nm.
@@ -78,7 +76,7 @@ class EnergyModel:
         self._range = mono if mi.is_monochromatic else wavelength_range
         self.conserving, self.beneath = conserving, beneath
         self._scale: DirectionLookup | None = None
-        self._ratio: DirectionLookup | None = None
+        self._excess: DirectionLookup | None = None
         self._ones: list[DirectionalTable] | None = None
 
     def update(self, table: DiffractionTable, factors: ScaleRange) -> None:
@@ -106,9 +104,9 @@ class EnergyModel:
                 None if scales is None else DirectionLookup(scales, nodes, factors, self._place)
             )
         if self.beneath:
-            nodes, ratios = self._nodes(_ratio_of)
-            assert ratios is not None
-            self._ratio = DirectionLookup(ratios, nodes, factors, self._place)
+            nodes, excesses = self._nodes(_excess_of)
+            assert excesses is not None
+            self._excess = DirectionLookup(excesses, nodes, factors, self._place)
 
     def _nodes(
         self, sides_of: SidesOf
@@ -130,9 +128,9 @@ class EnergyModel:
 
         return self._tabulated(fine, height_scale) if self.conserving else None
 
-    def ratio(self, height_scale: float) -> DirectionalTable | None:
-        """Return the table of `reflected`, for shaders; None where it is 1."""
-        return self._tabulated(_ratio_of, height_scale) if self.beneath else None
+    def excess(self, height_scale: float) -> DirectionalTable | None:
+        """Return the table of `albedo_excess`, for shaders; None without `beneath`."""
+        return self._tabulated(_excess_of, height_scale) if self.beneath else None
 
     @property
     def scales(self) -> bool:
@@ -153,11 +151,11 @@ class EnergyModel:
             horizon *= at_horizon(dr.abs(cosine) if self._both_sides else cosine)
         return product * horizon
 
-    def reflected(self, direction: Vector3f, site: Site) -> Colour:
-        """Return a(ω) over the flat interface's reflectance, per channel; 1 without `beneath`."""
-        if self._ratio is None:
-            return mi.UnpolarizedSpectrum(1.0)
-        return mi.UnpolarizedSpectrum(self._ratio.at(direction, site))
+    def albedo_excess(self, direction: Vector3f, site: Site) -> Colour:
+        """Return a(ω) less the flat interface's reflectance, per channel; 0 without `beneath`."""
+        if self._excess is None:
+            return mi.UnpolarizedSpectrum(0.0)
+        return mi.UnpolarizedSpectrum(self._excess.at(direction, site))
 
     def _tabulated(self, sides_of: SidesOf, height_scale: float) -> DirectionalTable | None:
         """Return the function that a look-up shows above the surface; None where it is 1.
@@ -186,8 +184,11 @@ def _scales_of(energy: Energy, found: Conservation) -> list[DirectionalTable] | 
     return found.scales
 
 
-def _ratio_of(energy: Energy, found: Conservation) -> list[DirectionalTable]:
-    """Return the albedo over the flat reflectance (`SidesOf`)."""
+def _excess_of(energy: Energy, found: Conservation) -> list[DirectionalTable]:
+    """Return the albedo less the flat reflectance (`SidesOf`).
+
+    A difference, because a film may reflect next to nothing where its rough surface reflects light.
+    """
     albedo, material = found.albedo, energy.material
     assert albedo is not None
     assert isinstance(material, conserved.Reflector)
@@ -195,11 +196,7 @@ def _ratio_of(energy: Energy, found: Conservation) -> list[DirectionalTable]:
     cosine, coat = np.cos(albedo.grid.theta), np.asarray(material.coat)
     flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
     flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
-    # of an index of 1 there is neither
-    ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
-    values = albedo.values * ratio
-    if isinstance(index, fresnel.Filmed | Stacked):  # which may reflect next to nothing
-        values = np.minimum(values, MOST_RATIO)
+    values = albedo.values - flat[:, :, None]
     return [DirectionalTable(albedo.wavelengths, values.astype(np.float32))]
 
 

@@ -15,6 +15,7 @@ from mitsuba_diffraction.optics.stack import amplitudes, mean_powers
 from mitsuba_diffraction.plugin.description import Feature, describe
 from mitsuba_diffraction.plugin.stack import read_layers
 from mitsuba_diffraction.realtime.glsl.shader_materials import GLSL
+from tests.support.furnace import furnace
 from tests.support.variants import obstacle
 
 pytestmark = pytest.mark.thorough
@@ -159,6 +160,15 @@ def test_no_direction_reflects_more_than_it_receives(tmp_path, variant):
         assert albedo.max() < 1.01  # of 32768 samples
         if theta == 0.0:
             assert albedo.max() > 0.8
+
+
+def test_a_gap_over_a_white_base_sends_on_no_more_than_it_gets(tmp_path, some_variant):
+    # flat, it reflects 3e-5; a window of 1.4 wavelengths reflects 0.01 of light from 65°
+    white = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
+    gap = {"int_ior": 1.01, "ext_ior": 1.0, "layers": stack(tmp_path, 'layers = [["1.0", 0.1]]')}
+    bsdf = mi.load_dict(md.bsdf_dict(FLAT, coherence_width=0.8, beneath=white, **gap))
+    mean, error = furnace(bsdf, angles=(0.0, 65.0, 80.0), azimuths=(0.0,))
+    assert np.all(mean <= 1.003 + 4.0 * error)
 
 
 def test_polarised_light_has_the_phases_of_a_film(tmp_path):

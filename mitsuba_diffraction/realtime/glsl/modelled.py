@@ -66,8 +66,8 @@ class Modelled:
 
     def conservation(self, scales: Sequence[float]) -> Packed:
         """Pack energy conservation and the base's light, one page per height scale."""
-        ratios = [self.described.reflected(scale) for scale in scales]
-        beneath = pack_beneath([ratio for ratio in ratios if ratio is not None])
+        excesses = [self.described.albedo_excess(scale) for scale in scales]
+        beneath = pack_beneath([excess for excess in excesses if excess is not None])
         pages = [self.described.energy_scale(scale) for scale in scales]
         if all(page is None for page in pages):
             return beneath

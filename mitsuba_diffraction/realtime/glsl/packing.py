@@ -127,18 +127,18 @@ def pack_energy(scales: Sequence[NDArray[np.float32]]) -> Packed:
     )
 
 
-def pack_beneath(ratios: Sequence[DirectionalTable]) -> Packed:
+def pack_beneath(excesses: Sequence[DirectionalTable]) -> Packed:
     """Pack the light that reaches the base beneath, one page per height scale.
 
-    ratios : albedo over the flat interface's reflectance (`Diffraction.reflected_ratio`).
+    excesses : albedo less the flat interface's reflectance (`Surface.albedo_excess`).
     """
-    if not ratios:
+    if not excesses:
         return Packed()
-    values = np.zeros((len(ratios), FINE.polar + 1, FINE.azimuthal, 4), np.float16)
-    for page, ratio in zip(values, ratios, strict=True):
-        page[..., :3] = _daylight_mean(ratio)
+    values = np.zeros((len(excesses), FINE.polar + 1, FINE.azimuthal, 4), np.float16)
+    for page, excess in zip(values, excesses, strict=True):
+        page[..., :3] = _daylight_mean(excess)
     texture = Texture("beneath", values.reshape(-1, *values.shape[2:]), smooth=True)
-    return Packed((texture,), {"energy_page": 0.0}, {"BENEATH": "", **_grid(len(ratios))})
+    return Packed((texture,), {"energy_page": 0.0}, {"BENEATH": "", **_grid(len(excesses))})
 
 
 def _daylight_mean(table: DirectionalTable) -> Array:

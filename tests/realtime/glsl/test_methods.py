@@ -250,8 +250,8 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
         parts = ("COLOUR_MAPPED", "AXIS_MAPPED", "PIGMENTED", "VCAVITY", "COHERENT")
         definitions |= dict.fromkeys(parts, "") | {"SURFACE_KIND": "2"}
         definitions |= pack_energy([scale, scale]).definitions
-        ratio = DirectionalTable(np.array([550.0]), scale[None])
-        definitions |= pack_beneath([ratio, ratio]).definitions
+        excess = DirectionalTable(np.array([550.0]), 0.0 * scale[None])
+        definitions |= pack_beneath([excess, excess]).definitions
         definitions |= pack_boundary(MODELS["small_slope"], table.roughness).definitions
     compile_program(gl, method, definitions).release()
     if "GL_ARB_ES3_compatibility" not in gl.extensions:

@@ -26,9 +26,9 @@ vec3 albedo(vec3 w, vec2 rotation)
 {
     vec3 found = flat_reflectance(w.z);
 #if defined(BENEATH) && !defined(GLANCE)
-    found *= reflected_ratio(in_patch(w, rotation), w.z);
+    found += albedo_excess(in_patch(w, rotation), w.z);
 #endif
-    return min(found, 1.0);
+    return clamp(found, 0.0, 1.0);
 }
 
 #endif

@@ -89,8 +89,8 @@ vec3 beneath_on_page(int page, vec2 cell)
     return texture(beneath, (vec2(cell.y, row) + 0.5) / vec2(textureSize(beneath, 0))).rgb;
 }
 
-// Albedo over the flat interface's reflectance; the tangential part is in the patch's frame.
-vec3 reflected_ratio(vec2 tangential, float cosine)
+// Albedo less the flat interface's reflectance; the tangential part is in the patch's frame.
+vec3 albedo_excess(vec2 tangential, float cosine)
 {
     vec2 cell = on_grid(tangential, cosine);
     return ON_PAGES(beneath_on_page, cell);
