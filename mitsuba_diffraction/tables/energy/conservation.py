@@ -27,7 +27,7 @@ from ..store import Record, cached, key_of
 from ..table import DiffractionTable
 from .conserved import Reflector, Transmitter
 from .gain import thick
-from .scaling import lowered, parallel, scaled
+from .scaling import lowered, parallel, scaled, weighted
 from .settings import VERSION, energy_settings
 from .transport import ScatteredLight, ScatteredOrders, Transport
 
@@ -210,14 +210,21 @@ class SurfaceEnergy:
         return scaled(light.sums, aim, largest[:, None], settings.sweeps)
 
     def _lower_between(self, nodes: Real, place: float, parts: int, s: Array) -> None:
-        """Lower s for light at a place between all neighbouring wavelengths."""
+        """Lower s for light at a place between all neighbouring wavelengths.
+
+        Few directions tell first between which ones light may exceed the ceiling.
+        """
         between = nodes[:-1] ** (1.0 - place) * nodes[1:] ** place if len(nodes) > 1 else nodes
+        few = self._lights(between, *self._grid.half.middles(1))
         lights = self._lights(between, *self._grid.middles(parts))
         ceiling, passes = np.float32(self._settings.ceiling), self._settings.passes
+        shares = np.array([1.0 - place, place])[: len(nodes)]
 
         def lower(n: int) -> None:
-            light, pair = lights[n](), slice(n, n + 2)
-            shares = np.array([1.0 - place, place])[: len(s[pair])]
+            pair = slice(n, n + 2)
+            if few[n]().sent(weighted(s[pair], shares)).max() <= self._settings.calm:
+                return
+            light = lights[n]()
             s[pair] = lowered(s[pair], shares, lambda s: light.sent(s) / ceiling, passes)
 
         for first in (0, 1):  # every other pair at a time: neighbours share a wavelength
