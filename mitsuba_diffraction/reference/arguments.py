@@ -16,7 +16,7 @@ from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import COHERENCES, SURFACE, TableSettings, checked
 from .model import Light
-from .screens import ScanWindows, Sigmas
+from .screens import LOOKUP, Sigmas
 
 
 def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
@@ -35,8 +35,7 @@ def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
     width, taper = window_and_taper(TableSettings(), [field], width)
     if taper is None:
         return Sigmas(sigma_of(width), sigma_of(light))
-    windows = ScanWindows(width)
-    return Sigmas(windows.lookup, sigma_of(light), windows)
+    return Sigmas(LOOKUP * sigma_of(width), sigma_of(light), width)
 
 
 class Window(NamedTuple):
@@ -82,8 +81,21 @@ def model_of(
     model: str | None,
     index: NDArray[np.complex128] | Filmed | None,
     models: Iterable[str] = MODELS,
+    coat: float | None = None,
 ) -> str:
-    """Return the name of the model, one of `models`; with an index the default is "small_slope"."""
+    """Return the name of the model, one of `models`; with an index the default is "small_slope".
+
+    coat : index of a coat over the surface, which is checked.
+    """
+    if coat is not None:
+        if index is None:
+            raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
+        if isinstance(index, Filmed):
+            raise DiffractionError(
+                f"coat={coat} and a film exclude each other: leave one of them out"
+            )
+        if not (np.isfinite(coat) and coat >= 1.0):
+            raise DiffractionError(f"coat={coat} must be an index of at least 1")
     if model is None:
         return "kirchhoff" if index is None else "small_slope"
     if checked_model(model, models) != "kirchhoff" and index is None:

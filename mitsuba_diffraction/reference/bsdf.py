@@ -79,7 +79,7 @@ def brdf(
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
-    name = _model_of(model, index, coat)
+    name = model_of(model, index, coat=coat)
     if index is None:
         others, zeroth, cosine = window_powers(field, *light, *window)
         others *= kirchhoff_factor(*light, window.sigmas.orders)
@@ -112,24 +112,10 @@ def mueller(
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
-    name = _model_of(model, index, coat)
+    name = model_of(model, index, coat=coat)
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
     return _reflected(boundary.mueller, field, light, window, name, index, coat)
-
-
-def _model_of(model: str | None, index: Complex | Filmed | None, coat: float | None) -> str:
-    """Return the name of the model, after a check of what goes together."""
-    if coat is not None:
-        if index is None:
-            raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
-        if isinstance(index, Filmed):
-            raise DiffractionError(
-                f"coat={coat} and a film exclude each other: leave one of them out"
-            )
-        if not (np.isfinite(coat) and coat >= 1.0):
-            raise DiffractionError(f"coat={coat} must be an index of at least 1")
-    return model_of(model, index)
 
 
 def _reflected(
@@ -144,36 +130,25 @@ def _reflected(
     """Measured light where both directions are above the surface, 0 elsewhere."""
     lit = (light.wi[:, 2] > 0) & (light.wo[:, 2] > 0)
     values = measure(np.zeros((len(lit), 2, 2), complex))
-    if lit.any():
-        above = Light(*(part[lit] for part in light))
-        values[lit] = _lit(measure, field, above, window.at(lit), name, index[lit], coat)
-    return values
-
-
-def _lit(
-    measure: Measure,
-    field: HeightField,
-    light: Light,
-    window: Window,
-    name: str,
-    index: Complex | Filmed,
-    coat: float | None,
-) -> Real:
-    """Measured light of directions above the surface."""
+    if not lit.any():
+        return values
+    light, window, index = Light(*(part[lit] for part in light)), window.at(lit), index[lit]
+    averaged = window.coherence == COHERENCES[0]
     if coat is not None:
         assert not isinstance(index, Filmed)
         inside, relative = coats.refracted_light(light, coat), index / coat
         jones = _matrices(field, inside, relative, name)
         powers = window_powers(field, *inside, *window)
-        return coats.reflected(light, window.sigmas, coat, relative, powers, jones, measure)
-    averaged = window.coherence == COHERENCES[0]
-    if name == "small_slope" and averaged and not isinstance(index, Filmed):
-        return models.default_brdf(field, light, index, window.sigmas, measure)
-    jones = _matrices(field, light, index, name)
-    others, zeroth, cosine = window_powers(field, *light, *window)
-    rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
-    mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
-    return interfering(rest, mirror, cosine)
+        values[lit] = coats.reflected(light, window.sigmas, coat, relative, powers, jones, measure)
+    elif name == "small_slope" and averaged and not isinstance(index, Filmed):
+        values[lit] = models.default_brdf(field, light, index, window.sigmas, measure)
+    else:
+        jones = _matrices(field, light, index, name)
+        others, zeroth, cosine = window_powers(field, *light, *window)
+        rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
+        mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
+        values[lit] = interfering(rest, mirror, cosine)
+    return values
 
 
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:

@@ -99,9 +99,6 @@ def transmitted(
 def _mirrors(outside: Real, n: float, index: ArrayLike) -> tuple[Real, Real]:
     """R_s and R_p of the face, the same from both sides, and of the flat structure, (..., 2)."""
     within = refracted(outside, n)[..., 2]
-    face, structure = amplitudes(outside[..., 2], n), amplitudes(within, index)
-    return _powers(*face), _powers(*structure)
-
-
-def _powers(r_s: Complex, r_p: Complex) -> Real:
-    return np.asarray(np.abs(np.stack([r_s, r_p], axis=-1)) ** 2)
+    both = amplitudes(outside[..., 2], n), amplitudes(within, index)
+    face, structure = (np.asarray(np.abs(np.stack(pair, axis=-1)) ** 2) for pair in both)
+    return face, structure
