@@ -107,9 +107,7 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     """
     at = _Light(table, *light, **sides)
     mean, difference, _ = _linear(at)
-    turned = (
-        np.abs(turned_axes(*(np.asarray(part, np.float64) for part in at[1:3])).sine) > IN_PLANE
-    )
+    turned = np.abs(_turned(at).sine) > IN_PLANE
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "

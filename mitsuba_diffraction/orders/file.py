@@ -24,6 +24,7 @@ import json
 import math
 import os
 import shlex
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ from ..errors import DiffractionError, one_line
 from ..files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES
 from ..tables.fields import mapping
+from ..tables.store import loaded_once
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
@@ -44,6 +46,8 @@ FORMAT_VERSION = 2
 SUFFIX = ".nc"
 _AGAIN = "solve it again with the command 'solve', or import its efficiencies again"
 _LISTED, _PHASES = "efficiency", "phase"
+
+_tables: weakref.WeakValueDictionary[str, OrderTable] = weakref.WeakValueDictionary()
 
 
 def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
@@ -143,6 +147,11 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
         raise DiffractionError(
             f"'{path}' is a damaged table of orders ({one_line(str(error))[:100]}); {_AGAIN}"
         ) from error
+
+
+def loaded_orders(path: str | os.PathLike[str]) -> OrderTable:
+    """Load a file once for all that use it at the same time."""
+    return loaded_once(path, load_orders, _tables)
 
 
 def _advice(path: Path) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -47,7 +47,7 @@ class Reflected(NamedTuple):
     Attributes
     ----------
     value : f cosθo.
-    density : of `Lobes.draw`, per solid angle.
+    density : of `SpectralLobes.draw`, per solid angle.
     """
 
     value: Spectrum
@@ -89,26 +89,6 @@ class Draw(NamedTuple):
     uv: Vector2f
     below: Mask
     valid: Mask
-
-
-class Lobes(Protocol):
-    """Light of all orders in the variant's channels, and directions drawn by it."""
-
-    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
-        """Return value and density of a pair.
-
-        below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
-            sheet.
-        ctx : says whether light comes along ωo (radiance) or along ωi (importance).
-        """
-
-    def draw(
-        self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
-    ) -> Draw:
-        """Draw a direction for light from ωi, given by its tangential part and cosine."""
-
-    def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
-        """Return the sum of the orders' efficiencies, of all sides."""
 
 
 class OrderLobe:
@@ -197,7 +177,10 @@ def nearest(position: Float, overlap: bool) -> list[Float]:
 
 
 class SpectralLobes:
-    """Spectral variants, whose rays carry wavelengths, and mono variants, which have one for all.
+    """Light of all orders in the variant's channels, and directions drawn by it.
+
+    Of spectral variants, whose rays carry wavelengths, and of mono variants, which have one for
+    all. `DaylightLobes` has the same methods for RGB variants.
 
     wavelength : nm, of mono variants.
     """
@@ -208,7 +191,12 @@ class SpectralLobes:
         dr.make_opaque(self._fixed)
 
     def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
-        """See `Lobes.reflected`; the density is the mean over wavelengths."""
+        """Return value and density of a pair; the density is the mean over wavelengths.
+
+        below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
+            sheet.
+        ctx : says whether light comes along ωo (radiance) or along ωi (importance).
+        """
         lit: list[Lit] = []
         density = mi.Float(0.0)
         wavelengths = self._wavelengths(si)
@@ -239,7 +227,10 @@ class SpectralLobes:
     def draw(
         self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
     ) -> Draw:
-        """See `Lobes.draw`: by one of the wavelengths, chosen with equal probability."""
+        """Draw a direction for light from ωi, given by its tangential part and cosine.
+
+        One of the wavelengths is chosen with equal probability.
+        """
         wavelengths = self._wavelengths(si)
         count = float(len(wavelengths))
         number = index_between(dr.floor(sample1 * count), 0.0, count - 1.0)
@@ -250,7 +241,7 @@ class SpectralLobes:
         return self._window.drawn(row, wavelength, sample1 * count - number, sample2)
 
     def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
-        """See `Lobes.albedo`."""
+        """Return the sum of the orders' efficiencies, of all sides."""
         rows = [self.lookup.row(*incident, cos_i, lam) for lam in self._wavelengths(si)]
         return mi.UnpolarizedSpectrum([self.lookup.total(row) for row in rows])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -283,9 +284,7 @@ def _band(
 ) -> Band:
     """Assemble the response of a band from its stations."""
     places = places_of(band, counts, _nodes(grating))
-    values_of = _limited_mueller if polarised else _along_grooves
-    if grating.block:
-        values_of = _lossless
+    values_of = _lossless if grating.block else partial(_limited, MUELLER if polarised else ALONG)
     return Band(
         band,
         *(
@@ -293,13 +292,6 @@ def _band(
             for kind in kinds_of(band)
         ),
     )
-
-
-def _along_grooves(amplitudes: Complex) -> Real:
-    """Return M₀₀ and M₀₁ (w, j, q, 2) of amplitudes, scaled where powers sum to more than 1."""
-    along = powers(amplitudes)
-    along_e, along_b = np.moveaxis(along / np.maximum(along.sum(axis=2, keepdims=True), 1.0), -1, 0)
-    return np.stack([0.5 * (along_e + along_b), 0.5 * (along_e - along_b)], axis=-1)
 
 
 def _lossless(amplitudes: Complex) -> Real:
@@ -314,11 +306,14 @@ def _lossless(amplitudes: Complex) -> Real:
     return others[..., None]
 
 
-def _limited_mueller(amplitudes: Complex) -> Real:
-    """Return the Mueller matrices of amplitudes, scaled where their powers sum to more than 1."""
+def _limited(count: int, amplitudes: Complex) -> Real:
+    """Return the first elements of the Mueller matrices of amplitudes, (w, j, q, count).
+
+    Amplitudes are scaled where their powers sum to more than 1.
+    """
     total = powers(amplitudes).sum(axis=2)
     matrices = mueller_of(amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None])
-    return matrices.reshape(*matrices.shape[:-2], 16)
+    return matrices.reshape(*matrices.shape[:-2], MUELLER)[..., :count]
 
 
 def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:
