@@ -177,19 +177,15 @@ def treated_by_default(
     """
     small = field.heights.size <= LARGE  # wider scans are cut into windows, which are levelled
     if options.level is None and options.periodic != "exact" and small and tilted(field, _SHORTEST):
-        field = _by_default(LEVELS["plane"](field), "level")
+        field = LEVELS["plane"](field)
+        *lines, last = field.history
+        # nobody asked for this treatment
+        field = replace(field, history=(*lines, f"{last} (by default; level=none leaves it out)"))
     elif measured and options.level in (None, "none"):
         rise = preprocess.plane_rise(field)
         line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
         field = field.changed(field.heights, line)
     return treat(field, options)
-
-
-def _by_default(field: HeightField, option: str) -> HeightField:
-    """Say in the last line of the history that nobody asked for this treatment."""
-    *lines, last = field.history
-    line = f"{last} (by default; {option}=none leaves it out)"
-    return replace(field, history=(*lines, line))
 
 
 def _read(file: Path, kind: FileKind, channel: str | int | None) -> tuple[RawHeights, bool]:

@@ -97,9 +97,15 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
             f"{field.range:.2g} µm, less than an atom"
         )
     if field.cut_out:
-        lines.append(tilt_warning(field, shortest))
+        if tilted(field, shortest):
+            turn = math.degrees(2 * math.atan(math.hypot(*plane_of(field))))
+            lines.append(
+                f"{field.name}: use level=plane: the patch is not levelled; its best plane rises "
+                f"{plane_rise(field):.3g} µm across it and turns the mirror direction by "
+                f"{turn:.2g}°"
+            )
         lines += damage(field)
-    return [line for line in lines if line]
+    return lines
 
 
 def tilted(field: HeightField, shortest: float) -> bool:
@@ -120,17 +126,6 @@ def tilted(field: HeightField, shortest: float) -> bool:
         if rise > least and max(float(s.max(initial=0.0)) for s in steps) < STEP * rise:
             return True
     return False
-
-
-def tilt_warning(field: HeightField, shortest: float) -> str:
-    """Return a warning of a tilted scan, or ""."""
-    if not tilted(field, shortest):
-        return ""
-    turn = math.degrees(2 * math.atan(math.hypot(*plane_of(field))))
-    return (
-        f"{field.name}: use level=plane: the patch is not levelled; its best plane rises "
-        f"{plane_rise(field):.3g} µm across it and turns the mirror direction by {turn:.2g}°"
-    )
 
 
 def jumping_lines(field: HeightField) -> str:

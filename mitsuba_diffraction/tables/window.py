@@ -146,11 +146,3 @@ def apply_window(matrices: Sequence[scipy.sparse.csr_array], bins: NDArray[Any])
     """Sum over the bins (ny, nx) with the weights of a matrix along x and one along y."""
     along_y = matrices[1] @ bins
     return (matrices[0] @ np.ascontiguousarray(along_y.T)).T
-
-
-def rows_by_trim(taps: tuple[int, int], trims: Sequence[int]) -> dict[int, list[int]]:
-    """Map from the number of taps skipped at either end of a row to the rows that skip it."""
-    rows: dict[int, list[int]] = {}
-    for row in range(taps[1]):
-        rows.setdefault(trims[row] if trims else 0, []).append(row)
-    return rows

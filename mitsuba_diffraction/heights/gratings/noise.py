@@ -49,18 +49,6 @@ def sample_field(field: FloatArray, extent: Pair, x: FloatArray, y: FloatArray) 
     return np.asarray(scipy.ndimage.map_coordinates(field, indices, order=3, mode="grid-wrap"))
 
 
-def on_pixels(field: FloatArray, ny: int, nx: int) -> FloatArray:
-    """Interpolate a periodic `field` (my, mx) on (ny, nx) pixels, by cubic splines."""
-    for axis, count in enumerate((ny, nx)):
-        nodes = field.shape[axis]
-        closed = np.take(field, np.arange(nodes + 1) % nodes, axis)
-        spline = scipy.interpolate.CubicSpline(
-            np.arange(nodes + 1), closed, axis=axis, bc_type="periodic"
-        )
-        field = spline(np.arange(count) * (nodes / count))
-    return field
-
-
 def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> FloatArray:
     """Draw white noise blurred to grains of `size` (σ along x, along y, µm), of unit variance.
 
