@@ -92,13 +92,13 @@ def _add_response(file: Any, table: OrderTable) -> None:
             ("wavelength", "theta", "phi"), response.axes, ("nm", *["degree"] * 2), strict=True
         )
         for name, values, unit in axes:
-            _add(file, name, (name,), values.astype(">f8"), unit)
+            add_variable(file, name, (name,), values.astype(">f8"), unit)
         for name, column in zip(("order_x", "order_y"), response.orders.T, strict=True):
-            _add(file, name, ("order",), column.astype(">i4"))
+            add_variable(file, name, ("order",), column.astype(">i4"))
         every = ("wavelength", "theta", "phi", "side", "port", "element")
-        _add(file, _LISTED, every, response.values.astype(">f4"))
+        add_variable(file, _LISTED, every, response.values.astype(">f4"))
         if response.phases is not None:
-            _add(file, _PHASES, every[:-1], response.phases.astype(">f4"), "radian")
+            add_variable(file, _PHASES, every[:-1], response.phases.astype(">f4"), "radian")
         return
     if response.even:
         file.even = np.int32(1)
@@ -109,13 +109,13 @@ def _add_response(file: Any, table: OrderTable) -> None:
                 *(f"{axis}_{kind}_{band.k}" for axis in ("j", "q")),
                 "element",
             )
-            _add(file, f"kind_{kind}_{band.k}", names, numbers.astype(">f4"))
+            add_variable(file, f"kind_{kind}_{band.k}", names, numbers.astype(">f4"))
 
 
-def _add(
+def add_variable(
     file: Any, name: str, axes: tuple[str, ...], numbers: NDArray[Any], units: str = "1"
 ) -> None:
-    """Add a variable, and the dimensions that the file lacks."""
+    """Add a variable to an open NetCDF file, and the dimensions that the file lacks."""
     for axis, size in zip(axes, numbers.shape, strict=True):
         if axis not in file.dimensions:
             file.createDimension(axis, size)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
@@ -23,12 +23,11 @@ from . import boundary
 from . import coat as coats
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
+from .boundary import Complex, Real
 from .integral import window_powers
 from .mirror import horizon_correction, interfering
 from .model import Light
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 #: A measure of Jones matrices (n, 2, 2): N of unpolarised light (n,), or Mueller matrices.
 Measure = Callable[[Complex], Real]
 

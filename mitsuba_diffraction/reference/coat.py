@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..optics.geometry import wavenumber
 from . import model
+from .boundary import Complex, Real
 from .fresnel import amplitudes
 from .mirror import horizon_correction, interfering, mirror_cosine
 from .model import Light
 from .screens import Sigmas
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def refracted_light(light: Light, coat: float) -> Light:

@@ -20,10 +20,9 @@ from numpy.typing import ArrayLike
 from ..errors import DiffractionError
 from ..optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from .arguments import directions_of
+from .boundary import Real
 from .fresnel import reflectance
 from .mirror import horizon_correction
-
-Real = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 #: Efficiency of order m: from x, y, the wavelength (nm) and m, arrays of one shape. x and y are
 #: direction cosines within the layer of the mirror direction, −ωi; see `orders.cells`.

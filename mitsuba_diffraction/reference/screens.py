@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 from ..heights.coherence import window_corners, window_places
 from ..heights.field import HeightField
 from ..heights.preprocess import plane_of
+from .boundary import Complex, Real
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 #: σ_l over σ.
 LOOKUP = 1.65
 #: t along y and along x; None along an axis without change of height, which tiles.

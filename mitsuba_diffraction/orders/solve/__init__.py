@@ -10,8 +10,7 @@ accuracy    error of a table, measured at random directions and wavelengths
 profiles    one period of the grooves as a polygon; generators and a reader
 grating_index  refractive index over wavelength, by name or number
 dispersion  indices of files: refractiveindex.info, Zemax's glasses
-structure   films on a profile, slices beneath it, and the substrate
-films       their reader and checks
+films       films on a profile, slices beneath it, and the substrate; their reader and checks
 stations    sets of directions with one system matrix
 integral    solver: boundary integral method
 chandezon   solver: coordinates that follow slopes

@@ -14,7 +14,8 @@ from ...errors import DiffractionError
 from .. import cells
 from ..cells import Counts
 from ..polarised import ODD, mueller_of
-from .accuracy import diffuse_light, powers
+from ..response import MUELLER, UNPOLARISED
+from .accuracy import diffuse_light
 from .jobs import Jobs, Problem
 from .nodes import MAX_NODES, MIN_NODES, Line, Place, count_for, lines
 from .settings import Estimate, Settings, announce_stage
@@ -43,7 +44,8 @@ def node_counts(
     places = [place for of_band in drawn.values() for line in of_band for place in line.places]
     announce_stage(announce, "choosing nodes", problem, jobs, places)
     solved = jobs.amplitudes(problem, places, "choosing nodes")
-    values_of = functools.partial(_elements, problem.grating) if how.polarised else _unpolarised
+    count = MUELLER if how.polarised else UNPOLARISED
+    values_of = functools.partial(_elements, problem.grating, count)
     # three variables share the tolerance; rarely seen bands may miss more. Polarisation changes in
     # more places than two crossings show
     tolerance = (_OF_POLARISED if how.polarised else 1.0) * how.tolerance
@@ -113,13 +115,11 @@ def _count(
     return Counts(*needed), float(np.linalg.norm(missed))
 
 
-def _unpolarised(place: Place, amplitudes: Complex) -> Real:
-    """Return unpolarised efficiencies (w, j, q, 1)."""
-    return powers(amplitudes).mean(axis=-1, keepdims=True)
+def _elements(grating: Grating, count: int, place: Place, amplitudes: Complex) -> Real:
+    """Return the first elements of ½ M (w, j, q, count), odd ones over y.
 
-
-def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
-    """Return ½ M (w, j, q, 16), whose norm is the efficiency, with odd elements over y."""
+    Of all 16 the norm is the efficiency.
+    """
     y = grating.station(*place).along[:, None, None, None, None]
     elements = 0.5 * mueller_of(amplitudes) * np.where(ODD, 1.0 / y, 1.0)
-    return elements.reshape(*elements.shape[:3], 16)
+    return elements.reshape(*elements.shape[:3], MUELLER)[..., :count]

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...errors import DiffractionError
 from .chandezon import stretched_period
-from .films import material_text
 from .jobs import CROSSED, MOST_RESOLUTION, Jobs, Problem
 from .nodes import AnyPlace, Place, kinds_of
 from .stations import Real, reversed_light
@@ -107,7 +106,7 @@ def _changed(problem: Problem, values: Sequence[tuple[Real, Real]]) -> float:
     light = sum(float(after.sum()) for _, after in values)
     if light < _DARK * sum(after.shape[1] for _, after in values):
         raise DiffractionError(
-            f"{problem.grating.profile.name} of {material_text(problem.grating)} reflects no "
+            f"{problem.grating.profile.name} of {problem.grating.material_text} reflects no "
             "light; choose materials that differ from the medium above, and layers that light "
             "passes"
         )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from ...heights.lengths import count_between, number_between
-from .films import material_text
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, solver_of
 from .nodes import AnyPlace
 from .resolution import STEP, Chosen, coarsest
@@ -71,7 +70,7 @@ def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
     grating = chosen.problem.grating
     return {
         "solver": solver_of(chosen.problem).name,
-        "material": material_text(grating),
+        "material": grating.material_text,
         "profile": grating.profile.name,
         "depth": grating.profile.depth,
         "solver_error": chosen.error,

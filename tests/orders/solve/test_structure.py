@@ -16,7 +16,7 @@ from docs.make.validation.stacks import (
 from docs.make.validation.stacks import stacked as grating
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
-from mitsuba_diffraction.orders.solve.films import material_text, read_layers
+from mitsuba_diffraction.orders.solve.films import read_layers
 from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of
 from mitsuba_diffraction.orders.solve.profiles import lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.resolution import places_to_test, resolved
@@ -107,7 +107,7 @@ def test_layers_are_read_from_a_file(tmp_path):
     assert len(layers) == 4
     surface = grating(lamellar(PERIOD, 0.05), beneath=layers)
     assert len(surface.structure.slices) == 4
-    assert "chitin and melanin 0.06 µm" in material_text(surface)
+    assert "chitin and melanin 0.06 µm" in surface.material_text
 
 
 def test_the_structure_identifies_a_problem():
