@@ -14,14 +14,14 @@ mends it, so that no matrix gains light or polarisation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..optics.arithmetic import Number, of, squared
 from ..optics.boundary import Jones
-from ..reference.boundary import mueller, polarisation_axes, turn
+from ..reference.boundary import mueller
 from . import cells
 from .cells import Array
 from .response import CellResponse
@@ -127,16 +127,3 @@ def nearest_jones(m: Sequence[Number]) -> Jones:
     inverse = xp.reciprocal(xp.sqrt(power))
     ss, sp, ps, pp = (entry * inverse for entry in vector)
     return ss, sp, ps, pp
-
-
-def s_and_p(jones: NDArray[np.complex128], incident: Array, leaving: Array) -> Any:
-    """Return Jones matrices about s and p of those about e and f.
-
-    s and p are those of `reference.boundary.polarisation_axes`.
-
-    incident, leaving : directions of propagation (…, 3).
-    """
-    s_in, s_out = polarisation_axes(-incident, leaving)
-    e_in, e_out = (np.array([0.0, 1.0, 0.0]) - d[..., 1:2] * d for d in (incident, leaving))
-    e_in, e_out = (e / np.linalg.norm(e, axis=-1, keepdims=True) for e in (e_in, e_out))
-    return turn(s_out, e_out, leaving) @ jones @ turn(e_in, s_in, incident)

@@ -117,7 +117,19 @@ def index_of(
         if film is not None:
             raise DiffractionError(f"film={film} needs an index beneath it: give eta (and k)")
         return None
-    index = _complex(eta, k, wavelength.shape)
+    real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
+    if not (np.all(np.isfinite(real)) and np.all(real > 0)):
+        raise DiffractionError(f"eta={real} must be positive and finite")
+    if not (np.all(np.isfinite(imaginary)) and np.all(imaginary >= 0)):
+        raise DiffractionError(
+            f"k={imaginary} must be finite and at least 0: the index is eta + ik"
+        )
+    try:
+        index = np.broadcast_to(real + 1j * imaginary, wavelength.shape)
+    except ValueError as error:
+        raise DiffractionError(
+            f"eta {real.shape} and k {imaginary.shape} do not fit {len(wavelength)} directions"
+        ) from error
     if film is None:
         return index
     layer, thickness = complex(film[0]), float(film[1])
@@ -127,22 +139,6 @@ def index_of(
             "thickness of at least 0 nm"
         )
     return Filmed(index, layer, wavenumber(wavelength) * thickness * 1e-3)
-
-
-def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.complex128]:
-    real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
-    if not (np.all(np.isfinite(real)) and np.all(real > 0)):
-        raise DiffractionError(f"eta={real} must be positive and finite")
-    if not (np.all(np.isfinite(imaginary)) and np.all(imaginary >= 0)):
-        raise DiffractionError(
-            f"k={imaginary} must be finite and at least 0: the index is eta + ik"
-        )
-    try:
-        return np.broadcast_to(real + 1j * imaginary, shape)
-    except ValueError as error:
-        raise DiffractionError(
-            f"eta {real.shape} and k {imaginary.shape} do not fit {shape[0]} directions"
-        ) from error
 
 
 def directions_of(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Light:

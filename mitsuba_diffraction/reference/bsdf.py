@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
-from ..optics.boundary import Heights, Model, geometry
+from ..optics.boundary import Heights, geometry
 from ..optics.boundary import model_of as registered_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import kirchhoff_factor, wavenumber
@@ -156,11 +156,8 @@ def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: s
         return models.kirchhoff(light.wi, light.wo, index)
     if name == "small_slope":
         return models.blended(light.wi, light.wo, index, models.share(field, light, index))
-    return registered(registered_model(name), field, light, index)
-
-
-def registered(model: Model, field: HeightField, light: Light, index: Complex | Filmed) -> Complex:
-    """J (n, 2, 2) of a registered model by its own formula, for heights without a table."""
+    # a registered model by its own formula, for heights without a table
+    model = registered_model(name)
     (x0, y0, z0), (x, y, z) = light.wi.T, light.wo.T
     heights = None
     if model.statistic is not None:

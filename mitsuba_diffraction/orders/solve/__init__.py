@@ -8,8 +8,7 @@ crossed     solver: coupled waves of crossed gratings
 settings    settings of a solution, and estimates of its stages
 accuracy    error of a table, measured at random directions and wavelengths
 profiles    one period of the grooves as a polygon; generators and a reader
-grating_index  refractive index over wavelength, by name or number
-dispersion  indices of files: refractiveindex.info, Zemax's glasses
+grating_index  refractive index over wavelength, by name or number, or of a file
 films       films on a profile, slices beneath it, and the substrate; their reader and checks
 stations    sets of directions with one system matrix
 integral    solver: boundary integral method
