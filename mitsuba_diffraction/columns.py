@@ -206,7 +206,8 @@ def parse_columns(lines: Iterable[str], shown: str) -> Columns:
                 f"{len(rows[0])}"
             )
         row, strange = _row(cells)
-        tail = min(tail, _empty_at_end(cells))
+        filled = (n for n, cell in enumerate(reversed(cells)) if cell.strip())
+        tail = min(tail, next(filled, len(cells)))
         words.update({(len(rows), n): cells[n].strip() for n in strange})
         rows.append(row)
         places.append(place)
@@ -275,14 +276,6 @@ def _splitter(line: str) -> Callable[[str], list[str]]:
 def _of_csv(text: str) -> list[str]:
     cells = next(csv.reader([text.replace("\0", "")], skipinitialspace=True), [""])
     return [c.replace(",", ".") if _DECIMAL_COMMA.fullmatch(c.strip()) else c for c in cells]
-
-
-def _empty_at_end(cells: list[str]) -> int:
-    """Count the empty cells at the end of a row."""
-    count = 0
-    while count < len(cells) and not cells[-1 - count].strip():
-        count += 1
-    return count
 
 
 def _row(cells: list[str]) -> tuple[Reals, list[int]]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-FloatArray = npt.NDArray[np.float64]
+from ..field import FloatArray as FloatArray
+
 Rng = np.random.Generator
 #: Lengths along x and y, µm.
 Pair = tuple[float, float]
