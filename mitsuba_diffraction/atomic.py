@@ -49,8 +49,15 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     _in_use.add(temporary)
     try:
         yield temporary
-        _flush(temporary)
-        _replace(temporary, target)
+        # a network's or a full disk may refuse the content late
+        with temporary.open("rb+") as file:
+            os.fsync(file.fileno())
+        try:
+            os.replace(temporary, target)
+        except PermissionError as error:  # on Windows no open file can be replaced
+            raise DiffractionError(
+                f"cannot write '{target}': {error.strerror}; close the programs that have it open"
+            ) from error
         note_output(target)
     except OSError as error:
         raise DiffractionError(
@@ -87,21 +94,6 @@ def check_target(target: Path) -> None:
     if not stat.S_ISREG(mode):
         raise DiffractionError(f"cannot write '{target}': it is a pipe or a device; name a file")
     refuse_input(target)
-
-
-def _flush(temporary: Path) -> None:
-    """Have the content of a file on its disk: a network's or a full disk may refuse it late."""
-    with temporary.open("rb+") as file:
-        os.fsync(file.fileno())
-
-
-def _replace(temporary: Path, target: Path) -> None:
-    try:
-        os.replace(temporary, target)
-    except PermissionError as error:  # on Windows no open file can be replaced
-        raise DiffractionError(
-            f"cannot write '{target}': {error.strerror}; close the programs that have it open"
-        ) from error
 
 
 def remove_temporaries() -> None:

@@ -206,12 +206,25 @@ def parse_columns(lines: Iterable[str], shown: str) -> Columns:
                 f"{len(rows[0])}"
             )
         row, strange = _row(cells)
-        tail = min(tail, _empty_at_end(cells))
+        filled = (n for n, cell in enumerate(reversed(cells)) if cell.strip())
+        tail = min(tail, next(filled, len(cells)))
         words.update({(len(rows), n): cells[n].strip() for n in strange})
         rows.append(row)
         places.append(place)
-    named = _named(header, split or str.split, rows, words)
-    return _without_empty(named, tail, places, header, shown)
+    numbers = np.array(rows, np.float64).reshape(len(rows), len(rows[0]) if rows else 0)
+    names, units = _named(header, split or str.split, numbers.shape[1])
+    # Leave out names of rows, and cells without a name that are empty at the end of all rows
+    start, stop = 0, numbers.shape[1]
+    # a name elsewhere and none here: names of rows
+    if stop > 2 and any(names) and not names[0]:
+        start = 1
+    while tail and stop - start > 1 and not names[stop - 1]:
+        tail, stop = tail - 1, stop - 1
+    kept = {(row, n - start): word for (row, n), word in words.items() if start <= n < stop}
+    return Columns(
+        tuple(names[start:stop]), tuple(units[start:stop]), numbers[:, start:stop],
+        np.array(places, np.int64), header, kept, shown,
+    )  # fmt: skip
 
 
 def _encoding(file: Path) -> str:
@@ -265,14 +278,6 @@ def _of_csv(text: str) -> list[str]:
     return [c.replace(",", ".") if _DECIMAL_COMMA.fullmatch(c.strip()) else c for c in cells]
 
 
-def _empty_at_end(cells: list[str]) -> int:
-    """Count the empty cells at the end of a row."""
-    count = 0
-    while count < len(cells) and not cells[-1 - count].strip():
-        count += 1
-    return count
-
-
 def _row(cells: list[str]) -> tuple[Reals, list[int]]:
     """Return the numbers of a row, NaN for words and gaps, and the places of words."""
     try:
@@ -297,19 +302,10 @@ def _number(cell: str) -> float | None:
     return number if math.isfinite(number) else math.nan
 
 
-class _Named(NamedTuple):
-    names: list[str]
-    units: list[str]
-    rows: list[Reals]
-    words: dict[tuple[int, int], str]
-
-
 def _named(
-    header: dict[int, str], split: Callable[[str], list[str]], rows: list[Reals],
-    words: dict[tuple[int, int], str],
-) -> _Named:  # fmt: skip
-    """Find the names and units of the columns in the last lines of the header."""
-    count = len(rows[0]) if rows else 0
+    header: dict[int, str], split: Callable[[str], list[str]], count: int
+) -> tuple[list[str], list[str]]:
+    """Find the names and units of so many columns in the last lines of the header."""
     names, units = [""] * count, [""] * count
     for line in reversed(header.values()):
         if line.startswith(_END):
@@ -330,31 +326,12 @@ def _named(
                 unit = end
             names[n], units[n] = name or cell, units[n] or unit
         break
-    return _Named(names, units, rows, words)
+    return names, units
 
 
 def _is_number(cell: str) -> bool:
     number = _number(cell)
     return number is not None and math.isfinite(number)
-
-
-def _without_empty(
-    named: _Named, tail: int, places: list[int], header: dict[int, str], shown: str
-) -> Columns:
-    """Leave out names of rows, and cells without a name that are empty at the end of all rows."""
-    names, units, rows, words = named
-    numbers = np.array(rows, np.float64).reshape(len(rows), len(rows[0]) if rows else 0)
-    start, stop = 0, numbers.shape[1]
-    # a name elsewhere and none here: names of rows
-    if stop > 2 and any(names) and not names[0]:
-        start = 1
-    while tail and stop - start > 1 and not names[stop - 1]:
-        tail, stop = tail - 1, stop - 1
-    kept = {(row, n - start): word for (row, n), word in words.items() if start <= n < stop}
-    return Columns(
-        tuple(names[start:stop]), tuple(units[start:stop]), numbers[:, start:stop],
-        np.array(places, np.int64), header, kept, shown,
-    )  # fmt: skip
 
 
 def save_rows(

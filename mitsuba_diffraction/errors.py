@@ -8,7 +8,6 @@ import sys
 import unicodedata
 import warnings
 from collections.abc import Iterable, Sequence
-from types import FrameType
 
 # Packages whose lines mean nothing to whoever reads a warning.
 _INTERNAL = ("mitsuba_diffraction", "mitsuba", "drjit")
@@ -40,7 +39,10 @@ def warn(text: str) -> None:
     through Mitsuba, at any depth. Filters by module therefore see the module of the caller.
     """
     frame = sys._getframe(1)
-    while _is_internal(frame) and frame.f_back is not None:
+    while frame.f_back is not None:
+        package = str(frame.f_globals.get("__name__")).partition(".")[0]
+        if package not in _INTERNAL:
+            break
         frame = frame.f_back
     warnings.warn_explicit(
         one_line(text), DiffractionWarning, frame.f_code.co_filename, frame.f_lineno,
@@ -49,20 +51,12 @@ def warn(text: str) -> None:
     )  # fmt: skip
 
 
-def _is_internal(frame: FrameType) -> bool:
-    return str(frame.f_globals.get("__name__")).partition(".")[0] in _INTERNAL
-
-
 def shortened(text: str) -> str:
     """Shorten every long word, usually a path, and every long quotation, by cutting out its middle.
 
     A text that still has over 500 characters loses its middle, too.
     """
-
-    def cut(match: re.Match[str]) -> str:
-        return _cut(match[0], _WORD)
-
-    return _cut(_LONG.sub(cut, text), _MESSAGE)
+    return _cut(_LONG.sub(lambda match: _cut(match[0], _WORD), text), _MESSAGE)
 
 
 def _cut(text: str, most: int) -> str:

@@ -50,16 +50,12 @@ def optional(module: str, subject: str = "") -> Any:
         return importlib.import_module(module)
     except ImportError as error:
         place = f"{subject}: " if subject else ""
+        # pip needs no copy of this package
+        marked = [line.partition(";")[::2] for line in requires(_NAME) or ()]
+        marker = f"extra == '{need.extra}'"
+        packages = " ".join(f"'{each.strip()}'" for each, when in marked if marker in when)
         alternative = f", or {need.alternative}" if need.alternative else ""
         raise DiffractionError(
             f"{place}{need.clause}, which is not installed: pip install "
-            f"{_packages(need.extra)} (extra {need.extra}){alternative}"
+            f"{packages} (extra {need.extra}){alternative}"
         ) from error
-
-
-def _packages(extra: str) -> str:
-    """Return the packages of an extra for pip, which need no copy of this package."""
-    marked = [line.partition(";")[::2] for line in requires(_NAME) or ()]
-    return " ".join(
-        f"'{package.strip()}'" for package, marker in marked if f"extra == '{extra}'" in marker
-    )

@@ -178,19 +178,16 @@ def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
             if folder.refused is not None:
                 raise folder.refused
     for mesh in scene.geometry.values():
-        _check_picture(document, getattr(mesh.visual, "material", None), wanted_by)
+        kept: Any = getattr(mesh.visual, "material", None)
+        if not str(getattr(kept, "name", "")).isdecimal():
+            continue
+        base = document["materials"][int(kept.name)].get("pbrMetallicRoughness", {})
+        # `trimesh` leaves out what it cannot read
+        if "baseColorTexture" in base and kept.baseColorTexture is None:
+            raise DiffractionError(
+                f"{wanted_by}: its picture cannot be read, or is too large; save it as PNG"
+            )
     return scene
-
-
-def _check_picture(document: dict[str, Any], material: Any, wanted_by: str) -> None:
-    """Refuse a material without the picture that the document gives it: `trimesh` leaves it out."""
-    if not str(getattr(material, "name", "")).isdecimal():
-        return
-    base = document["materials"][int(material.name)].get("pbrMetallicRoughness", {})
-    if "baseColorTexture" in base and material.baseColorTexture is None:
-        raise DiffractionError(
-            f"{wanted_by}: its picture cannot be read, or is too large; save it as PNG"
-        )
 
 
 def _parts(file: Path) -> tuple[dict[str, Any], bytes | None]:

@@ -8,6 +8,7 @@ lists all limits; tests/test_limits.py compares its table with this module.
 from __future__ import annotations
 
 import contextlib
+import graphlib
 import math
 import sys
 import threading
@@ -157,24 +158,13 @@ def _address_space(more: int) -> Iterator[None]:
 def tree_sizes(inner: Sequence[Sequence[int]]) -> list[float]:
     """Return the number of nodes in the tree below each node of a graph, itself included.
 
-    A node that is reached on two ways counts twice, and in a circle without end.
+    A node that is reached on two ways counts twice. All are infinite in a graph with a circle.
 
     inner : numbers of the nodes to which each node refers.
     """
-    sizes = [0.0] * len(inner)
-    # False on the way down, True once the size is known
-    known: dict[int, bool] = {}
-    for first in range(len(inner)):
-        waiting = [first]
-        while waiting:
-            number = waiting[-1]
-            if number not in known:
-                known[number] = False
-                waiting += [other for other in inner[number] if other not in known]
-                continue
-            waiting.pop()
-            if not known[number]:
-                circle = not all(known[other] for other in inner[number])
-                total = 1.0 + sum(sizes[other] for other in inner[number])
-                sizes[number], known[number] = math.inf if circle else total, True
+    sizes = [math.inf] * len(inner)
+    with contextlib.suppress(graphlib.CycleError):
+        # those that a node refers to come first
+        for number in [*graphlib.TopologicalSorter(dict(enumerate(inner))).static_order()]:
+            sizes[number] = 1.0 + sum(sizes[other] for other in inner[number])
     return sizes

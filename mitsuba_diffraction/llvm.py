@@ -58,7 +58,10 @@ def find_llvm() -> list[Library]:
     """All of them, the one to prefer first: 19, then the newest, then unknown versions."""
     named = named_library()
     files = [*([named.path] if named else []), *in_folders()]
-    return sorted({Library.at(file) for file in files if file.is_file()}, key=_preference)
+    return sorted(
+        {Library.at(file) for file in files if file.is_file()},
+        key=lambda found: (found.version != TESTED, -(found.version or 0), str(found.path)),
+    )
 
 
 def named_library() -> Library | None:
@@ -71,10 +74,6 @@ def named_library() -> Library | None:
             if file.name == value:
                 return Library.at(file)
     return Library.at(value)
-
-
-def _preference(library: Library) -> tuple[bool, int, str]:
-    return library.version != TESTED, -(library.version or 0), str(library.path)
 
 
 def in_folders(
@@ -91,40 +90,31 @@ def in_folders(
     environment : environment variables.
     root : folder that stands for the root of the file system; not on Windows.
     """
-    for folder in _folders(system, machine, environment, root):
+    prefix = Path(sys.prefix)  # conda installs LLVM beside Python
+    if system == "win32":
+        programs = environment.get("PROGRAMFILES", r"C:\Program Files")
+        folders = [prefix / "Library" / "bin", Path(programs) / "LLVM" / "bin"]
+        searched = environment.get("PATH", "").split(";")
+    elif system == "darwin":
+        # Homebrew on Apple silicon, MacPorts, Homebrew on Intel
+        patterns = (
+            "opt/homebrew/opt/llvm*/lib", "opt/local/libexec/llvm-*/lib", "usr/local/opt/llvm*/lib"
+        )  # fmt: skip
+        folders = [prefix / "lib", *(found for each in patterns for found in root.glob(each))]
+        searched = environment.get("DYLD_LIBRARY_PATH", "").split(":")
+    else:
+        usr = root / "usr"
+        folders = [prefix / "lib", usr / "lib" / f"{machine}-linux-gnu", usr / "lib64", usr / "lib"]
+        for pattern in ("lib/llvm-*/lib", "lib64/llvm*/lib", "lib/llvm/*/lib64"):
+            folders += usr.glob(pattern)
+        folders.append(usr / "local" / "lib")
+        searched = environment.get("LD_LIBRARY_PATH", "").split(":")
+    for folder in [*folders, *(Path(name) for name in searched if name)]:
         try:
             entries = list(os.scandir(folder))
         except OSError:
             continue  # most systems have only a few of these folders
         yield from (Path(entry.path) for entry in entries if _FILE.fullmatch(entry.name))
-
-
-def _folders(
-    system: str, machine: str, environment: Mapping[str, str], root: Path
-) -> Iterator[Path]:
-    """Yield the folders with libraries for an architecture; parameters as in `in_folders`."""
-    prefix = Path(sys.prefix)  # conda installs LLVM beside Python
-    if system == "win32":
-        programs = environment.get("PROGRAMFILES", r"C:\Program Files")
-        yield from (prefix / "Library" / "bin", Path(programs) / "LLVM" / "bin")
-        searched = environment.get("PATH", "").split(";")
-    elif system == "darwin":
-        yield prefix / "lib"
-        # Homebrew on Apple silicon, MacPorts, Homebrew on Intel
-        for pattern in (
-            "opt/homebrew/opt/llvm*/lib", "opt/local/libexec/llvm-*/lib", "usr/local/opt/llvm*/lib"
-        ):  # fmt: skip
-            yield from root.glob(pattern)
-        searched = environment.get("DYLD_LIBRARY_PATH", "").split(":")
-    else:
-        yield prefix / "lib"
-        usr = root / "usr"
-        yield from (usr / "lib" / f"{machine}-linux-gnu", usr / "lib64", usr / "lib")
-        for pattern in ("lib/llvm-*/lib", "lib64/llvm*/lib", "lib/llvm/*/lib64"):
-            yield from usr.glob(pattern)
-        yield usr / "local" / "lib"
-        searched = environment.get("LD_LIBRARY_PATH", "").split(":")
-    yield from (Path(folder) for folder in searched if folder)
 
 
 def select_llvm() -> Library | None:

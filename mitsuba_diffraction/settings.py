@@ -80,12 +80,6 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _whole(value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, (str, numbers.Integral)):
-        raise ValueError
-    return int(value)
-
-
 def _among(*choices: str) -> Callable[[Any], str]:
     def check(value: Any) -> str:
         if not isinstance(value, str) or value not in choices:
@@ -109,7 +103,9 @@ def _between(low: float, high: float) -> Callable[[Any], float]:
 
 def _count(most: int) -> Callable[[Any], int]:
     def check(value: Any) -> int:
-        number = _whole(value)
+        if isinstance(value, bool) or not isinstance(value, (str, numbers.Integral)):
+            raise ValueError
+        number = int(value)
         if not 1 <= number <= most:
             raise ValueError
         return number
@@ -122,13 +118,8 @@ def _or(word: str | None, check: Callable[[Any], Any], *also: None) -> Callable[
     return lambda value: word if value in (word, *also) else check(value)
 
 
-def _pair(value: Any) -> tuple[float, float]:
-    low, high = (_number(end) for end in value)
-    return low, high
-
-
 def _wavelengths(value: Any) -> tuple[float, float]:
-    low, high = _pair(value)
+    low, high = (_number(end) for end in value)
     if not 10.0 <= low < high <= 1e5:
         raise ValueError
     return low, high

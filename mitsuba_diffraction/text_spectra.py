@@ -11,12 +11,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .columns import WAVELENGTH_UNITS, Columns, read_columns
+from .columns import WAVELENGTH_UNITS, Columns, Reals, read_columns
 from .errors import DiffractionError, warn
-
-Reals = NDArray[np.float64]
 
 #: Suffixes of spectra: text, and what software of spectrometers names its text.
 SPECTRA = (

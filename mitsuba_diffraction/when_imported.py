@@ -33,22 +33,13 @@ class _Finder(importlib.abc.MetaPathFinder):
         spec = importlib.util.find_spec(name)
         if spec is None or spec.loader is None:  # not installed, now
             sys.meta_path.insert(0, self)
-        else:
-            spec.loader = _Loader(spec.loader, self._action)
+            return spec
+        loader, action, run = spec.loader, self._action, spec.loader.exec_module
+
+        def run_and_act(module: ModuleType) -> None:
+            del loader.exec_module  # this loader's own again: the class has one, too
+            run(module)
+            action()
+
+        loader.exec_module = run_and_act  # type: ignore[method-assign]
         return spec
-
-
-class _Loader(importlib.abc.Loader):
-    """Loader that runs a module as another does, and then an action."""
-
-    def __init__(self, loader: importlib.abc.Loader, action: Callable[[], None]) -> None:
-        self._loader, self._action = loader, action
-
-    def create_module(self, spec: ModuleSpec) -> ModuleType | None:
-        return self._loader.create_module(spec)
-
-    def exec_module(self, module: ModuleType) -> None:
-        assert module.__spec__ is not None
-        module.__spec__.loader = module.__loader__ = self._loader
-        self._loader.exec_module(module)
-        self._action()

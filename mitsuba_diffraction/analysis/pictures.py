@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
-from ..heights.field import HeightField
-from ..heights.spectra import FloatArray, far_field, height_spectrum, order_powers, profile
+from ..heights.field import FloatArray, HeightField
+from ..heights.spectra import far_field, height_spectrum, order_powers, profile
 from ..tables.energy.conservation import Conservation, SurfaceEnergy
 from ..tables.energy.conserved import Reflector
 from ..tables.table import DiffractionTable

@@ -101,7 +101,7 @@ class Measurement:
         from ..analysis.scans import table_of
         from ..analysis.spectra import table_range
         from ..heights.coherence import blur
-        from ..heights.load import notes_line
+        from ..heights.source import notes_line
         from ..heights.spectra import dominant_periods
 
         args, geometry, first = self.args, self.geometry, float(self.lam[0])

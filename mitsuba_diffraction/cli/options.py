@@ -383,7 +383,7 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:
     """Return a line on the number of notes on heights and the command that prints them, or ""."""
-    from ..heights.load import notes_line
+    from ..heights.source import notes_line
 
     lines = table_warnings([field], settings)
     return notes_line(lines, args.source, load_options(args), settings)

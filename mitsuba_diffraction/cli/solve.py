@@ -274,7 +274,7 @@ def _report(table: OrderTable, output: Path) -> Iterator[tuple[str, str]]:
     if facts.get("solver_error") is not None:
         yield "", f"its next resolution changes {facts['solver_error']:.2g} of the light"
     size = output.stat().st_size / 1e6
-    yield "table", f"{table.layout}, {size:.2g} MB on disk"
+    yield "table", f"{table.response.layout}, {size:.2g} MB on disk"
     if "error_mean" in facts:
         yield (
             "error",

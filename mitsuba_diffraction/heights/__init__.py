@@ -3,15 +3,13 @@
 Contents
 --------
 HeightField  heights in µm on a grid that tiles the plane (in `field`)
-Source       where heights come from: file, recipe, several files, array (in `source`)
-load         a `HeightField` from any file
+Source       where heights come from: file, recipe, several files, array; `load` (in `source`)
 read         `LoadOptions`; choice of reader, units and treatments
 formats      readers, by kind of file
 recipes      TOML files that name the source of heights and the settings of their table
 preprocess   treatments of heights: crop, fill, level, clip
 gratings     height fields computed from formulas
-damage       aborted and repeated lines, and the bow of a scanner
-validity     warnings where a patch leaves the model or its own resolution
+validity     warnings where a patch leaves the model, is damaged, or lacks resolution
 scatter      scatter of a rough mirror: power spectrum, total integrated scatter, ABg model
 spectra      spectrum of heights, and powers of their orders
 coherence    coherence width that a patch allows
@@ -21,8 +19,7 @@ lengths      checks of lengths, counts and other numbers that users write
 from __future__ import annotations
 
 from .field import HeightField
-from .load import load, treated
-from .source import Source
+from .source import Source, load, treated
 from .validity import validity
 
 __all__ = ["HeightField", "Source"]

@@ -197,15 +197,10 @@ def window_warning(width: float, patches: Sequence[HeightField]) -> str:
         )
     if not repeats(width, patches):
         return ""
-    fitting = _two_digits(widest)
+    unit = 10.0 ** (math.floor(math.log10(widest)) - 1)
+    fitting = float(f"{math.floor(widest / unit * (1 + 1e-9)) * unit:.2g}")  # down to two digits
     return (
         f"{first.name}: use coherence_width={fitting:g}, a larger "
         "scan, or of whole periods periodic=exact: the window of "
         f"{width:.4g} µm is wider than the patch of {size} µm, whose repetition shows as a grating"
     )
-
-
-def _two_digits(length: float) -> float:
-    """Round a length down to two digits."""
-    unit = 10.0 ** (math.floor(math.log10(length)) - 1)
-    return float(f"{math.floor(length / unit * (1 + 1e-9)) * unit:.2g}")

@@ -57,8 +57,8 @@ class HeightField:
     periodic: bool = field(default=False, kw_only=True)
 
     # The package `heights` sets these: their modules import this class.
-    load: ClassVar[Callable[..., HeightField]]  #: `load.load`: read a file
-    treated: ClassVar[Callable[..., HeightField]]  #: `load.treated`: apply treatments
+    load: ClassVar[Callable[..., HeightField]]  #: `source.load`: read a file
+    treated: ClassVar[Callable[..., HeightField]]  #: `source.treated`: apply treatments
     validity: ClassVar[Callable[..., list[str]]]  #: `validity.validity`: warn of the model's limits
 
     def __init__(
@@ -121,7 +121,10 @@ class HeightField:
         Steps at the seams between tiles are left out: they are not part of the surface.
         """
         squares = (
-            sum(_squares(np.diff(rows, axis=axis)) for rows in blocks(self.heights, 1 - axis))
+            sum(
+                float(np.vdot(steps := np.diff(rows, axis=axis), steps))
+                for rows in blocks(self.heights, 1 - axis)
+            )
             for axis in (1, 0)
         )
         (ny, nx), (dx, dy), (along_x, along_y) = self.shape, self.pixel_size, squares
@@ -227,7 +230,12 @@ def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, flo
         array.setflags(write=False)
     low, high = float(array.min()), float(array.max())  # NaN if any height is
     if not (math.isfinite(low) and math.isfinite(high)):
-        raise DiffractionError(f"{name}: {_describe_missing(array)}")
+        if not np.isfinite(array).any():
+            raise DiffractionError(f"{name}: no height is a finite number; the patch is empty")
+        raise DiffractionError(
+            f"{name}: {np.count_nonzero(np.isnan(array))} of {array.size} heights are NaN and "
+            f"{np.count_nonzero(np.isinf(array))} infinite; fill or crop them"
+        )
     if high - low > LONGEST_HEIGHT:
         raise DiffractionError(
             f"{name}: heights span {high - low:.3g} µm, at most {LONGEST_HEIGHT:g} is supported; "
@@ -241,23 +249,8 @@ def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, flo
     return array, offset
 
 
-def _describe_missing(array: FloatArray) -> str:
-    """Return how many heights are NaN or infinite, for an error message."""
-    if not np.isfinite(array).any():
-        return "no height is a finite number; the patch is empty"
-    return (
-        f"{np.count_nonzero(np.isnan(array))} of {array.size} heights are NaN and "
-        f"{np.count_nonzero(np.isinf(array))} infinite; fill or crop them"
-    )
-
-
 def blocks(heights: FloatArray, overlap: int = 0) -> Iterator[FloatArray]:
     """Yield `ROWS` rows of large heights at a time, and `overlap` of the next ones; else all."""
     rows = len(heights) if heights.size <= LARGE else ROWS
     for start in range(0, len(heights), rows):
         yield heights[start : start + rows + overlap]
-
-
-def _squares(values: FloatArray) -> float:
-    flat = values.ravel()
-    return float(np.dot(flat, flat))

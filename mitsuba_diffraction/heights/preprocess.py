@@ -238,13 +238,8 @@ def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
     The robust standard deviation is 1.4826 times the median absolute deviation, which a few points
     of dust do not change.
 
-    Raises a DiffractionError if `sigmas` is below 1, or more than half of the heights are equal:
-    the deviation is 0 then.
+    Raises a DiffractionError if more than half of the heights are equal: the deviation is 0 then.
     """
-    if not 1 <= sigmas < math.inf:
-        raise DiffractionError(
-            f"clip: expected how many standard deviations to keep, at least 1, got {sigmas!r}"
-        )
     median = float(np.median(field.heights))
     sigma = MAD_TO_SIGMA * float(np.median(np.abs(field.heights - median)))
     if sigma == 0 and field.range > 0:
@@ -289,9 +284,3 @@ def _centred(field: HeightField) -> tuple[FloatArray, ...]:
         (np.arange(count, dtype=np.float64) - (count - 1) / 2) * pixel
         for count, pixel in zip(field.shape[::-1], field.pixel_size, strict=True)
     )
-
-
-def periodic_exact(field: HeightField) -> HeightField:
-    """Mark the patch as whole periods of a surface; heights stay as they are."""
-    line = "taken for whole periods of a surface that repeats exactly"
-    return field.changed(field.heights, line, cut_out=False, periodic=True)

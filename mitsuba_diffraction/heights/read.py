@@ -41,9 +41,11 @@ LEVELS = {
     "quadratic": preprocess.level_quadratic,
     "lines": preprocess.level_lines,
 }
-#: Statements about the edges of a patch: whole periods of a surface that repeats, or a part of a
-#: larger surface.
-PERIODICS = ("exact", "open")
+#: Statements about the edges of a patch.
+PERIODICS = {
+    "exact": "whole periods of a surface that repeats exactly",
+    "open": "a part of a larger surface",
+}
 
 
 def _channel(value: object) -> str | int | None:
@@ -68,7 +70,7 @@ def _periodic(value: object) -> str | None:
     """Check the statement about the edges; values of earlier versions state nothing."""
     if retired_value("periodic", value):
         return None
-    return _choice(value, "periodic", PERIODICS)
+    return _choice(value, "periodic", tuple(PERIODICS))
 
 
 def _sigmas(value: object) -> float | None:
@@ -125,7 +127,7 @@ class LoadOptions:
 
     @classmethod
     def parse(cls, **options: Any) -> LoadOptions:
-        """Check options as users write them (see `load.load`) and convert their types.
+        """Check options as users write them (see `source.load`) and convert their types.
 
         Raises a DiffractionError if a value is not valid; the message names the parameter and the
         choices.
@@ -177,19 +179,15 @@ def treated_by_default(
     """
     small = field.heights.size <= LARGE  # wider scans are cut into windows, which are levelled
     if options.level is None and options.periodic != "exact" and small and tilted(field, _SHORTEST):
-        field = _by_default(LEVELS["plane"](field), "level")
+        field = LEVELS["plane"](field)
+        *lines, last = field.history
+        # nobody asked for this treatment
+        field = replace(field, history=(*lines, f"{last} (by default; level=none leaves it out)"))
     elif measured and options.level in (None, "none"):
         rise = preprocess.plane_rise(field)
         line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
         field = field.changed(field.heights, line)
     return treat(field, options)
-
-
-def _by_default(field: HeightField, option: str) -> HeightField:
-    """Say in the last line of the history that nobody asked for this treatment."""
-    *lines, last = field.history
-    line = f"{last} (by default; {option}=none leaves it out)"
-    return replace(field, history=(*lines, line))
 
 
 def _read(file: Path, kind: FileKind, channel: str | int | None) -> tuple[RawHeights, bool]:
@@ -318,9 +316,7 @@ def treat(field: HeightField, options: LoadOptions) -> HeightField:
         field = LEVELS[options.level](field)
     if options.clip is not None:
         field = preprocess.clip_outliers(field, options.clip)
-    if options.periodic == "exact":
-        field = preprocess.periodic_exact(field)
-    if options.periodic == "open":
-        line = "taken for a part of a larger surface"
-        field = field.changed(field.heights, line, cut_out=True, periodic=False)
+    if options.periodic is not None:
+        exact, line = options.periodic == "exact", f"taken for {PERIODICS[options.periodic]}"
+        field = field.changed(field.heights, line, cut_out=not exact, periodic=exact)
     return field

@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..errors import DiffractionError, warn
-from .field import HeightField
+from .field import FloatArray, HeightField
 from .spectra import frequencies, height_spectrum
-
-Reals = NDArray[np.float64]
 
 #: Rings of spatial frequency for each octave.
 _RINGS = 6
@@ -39,8 +37,8 @@ class PowerSpectrum(NamedTuple):
     band : shortest and longest spatial wavelength, µm.
     """
 
-    frequency: Reals
-    density: Reals
+    frequency: FloatArray
+    density: FloatArray
     modes: NDArray[np.int64]
     rms: float
     slope: float
@@ -132,7 +130,7 @@ def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg:
     weight = np.sqrt(spectrum.modes[used] / spectrum.modes[used].sum())
     brdf = 16.0 * np.pi**2 / lam**4 * spectrum.density[used]
 
-    def residuals(parameters: Reals) -> Reals:
+    def residuals(parameters: FloatArray) -> FloatArray:
         log_a, log_b, g = parameters
         return np.asarray(weight * (log_a - np.log(np.exp(log_b) + beta**g) - np.log(brdf)))
 

@@ -14,10 +14,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .field import HeightField
+from .field import FloatArray, HeightField
 from .preprocess import arc_of
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Least ratio of a grating's peak to the median of all directions at its frequency, and to that of
 #: lower frequencies in its direction. Rough surfaces reach 20 by chance, snakes' fingers 1e4.
@@ -109,7 +107,7 @@ def seen_slope(field: HeightField, shortest: float) -> float:
 
     shortest : shortest wavelength, µm.
     """
-    central = field.heights[tuple(_central(n) for n in field.shape)]
+    central = _central(field.heights)
     part = HeightField(central, field.pixel_size)
     fx, fy = frequencies(part)
     square = fx**2 + fy**2
@@ -139,7 +137,7 @@ def examine_periods(field: HeightField, most: int = 3) -> Periods:
     two and a half periods at least, unless the patch is whole periods (not `cut_out`) and hardly
     changes along the other axis: the patch tiles the plane, so such a profile is a grating.
     """
-    central = field.heights[tuple(_central(n) for n in field.shape)]
+    central = _central(field.heights)
     if field.cut_out or central.shape != field.shape:
         central = central - arc_of(central)
     spectrum = _Spectrum(HeightField(central, field.pixel_size))
@@ -170,7 +168,13 @@ def examine_periods(field: HeightField, most: int = 3) -> Periods:
         left[peak.explained] = spectrum.power[peak.explained] = 0.0
     gratings.sort(key=lambda grating: -grating.share)
     if not gratings and not field.cut_out:
-        gratings = _repeated_profile(field)
+        for axis, direction in ((1, 0.0), (0, 90.0)):
+            profile = field.heights.mean(axis=1 - axis)
+            share = float(profile.var() / field.heights.var())
+            if share >= _PROFILE:  # the heights change along one axis only
+                strongest = 1 + int(np.abs(np.fft.rfft(profile))[1:].argmax())
+                gratings = [Periodicity(field.extent[1 - axis] / strongest, direction, share)]
+                break
     weak.sort(key=lambda structure: -structure.share)
     return Periods(gratings, weak[0] if weak else None)
 
@@ -267,21 +271,10 @@ class _Spectrum:
         return None
 
 
-def _repeated_profile(field: HeightField) -> list[Periodicity]:
-    """Return the grating of a patch whose heights change along one axis only, if they do."""
-    for axis, direction in ((1, 0.0), (0, 90.0)):
-        profile = field.heights.mean(axis=1 - axis)
-        share = float(profile.var() / field.heights.var())
-        if share >= _PROFILE:
-            strongest = 1 + int(np.abs(np.fft.rfft(profile))[1:].argmax())
-            return [Periodicity(field.extent[1 - axis] / strongest, direction, share)]
-    return []
-
-
-def _central(count: int) -> slice:
-    """Return the slice of the central `_LARGEST` of `count` samples."""
-    kept = min(count, _LARGEST)
-    return slice((count - kept) // 2, (count - kept) // 2 + kept)
+def _central(heights: FloatArray) -> FloatArray:
+    """Return the central `_LARGEST` samples at most along both axes."""
+    y, x = (max(n - _LARGEST, 0) // 2 for n in heights.shape)
+    return heights[y : y + _LARGEST, x : x + _LARGEST]
 
 
 def _periodicity(frequency: FloatArray, share: float, repeats: float) -> Periodicity:

@@ -16,8 +16,6 @@ block loses no light: order 0 of the reflection has 1 − Σ η, which is exact 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -34,21 +32,14 @@ from .table import OrderTable
 _LEAST_WITHIN, _LEAST_ABOVE = 0.04, 0.05
 
 
-class PortFactors(NamedTuple):
-    """Factors between ports, of channels (…, n).
+def factors(x: Array, y: Array, index: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Return factors between ports from e to η, (…, 2n, 2n), and whether both are known.
 
-    Attributes
-    ----------
-    scale : (…, 2n, 2n) from e to η; 0 in order 0 of the reflection, and where a port has no light.
-    known : (…, 2n, 2n) whether both ports are far enough from grazing.
+    Factors are 0 in order 0 of the reflection, and where a port has no light. Known ones are far
+    enough from grazing.
+
+    x, y : of channels, (…, n) and (…, 1) or (…, n), over 2π/λ.
     """
-
-    scale: Array
-    known: NDArray[np.bool_]
-
-
-def factors(x: Array, y: Array, index: float) -> PortFactors:
-    """Return the factors of channels; x (…, n) and y (…, 1) or (…, n), over 2π/λ."""
     above = 1.0 - x * x - y * y
     within = above + (index**2 - 1.0)
     z_within, z_above = (np.sqrt(np.maximum(square, 0.0)) for square in (within, above))
@@ -59,12 +50,13 @@ def factors(x: Array, y: Array, index: float) -> PortFactors:
     scale[..., lower, lower] = scale[..., upper, upper] = 0.0
     scale[..., lower, upper] = scale[..., upper, lower] = face_transmittance(z_above, index)
     far = np.concatenate([z_within > _LEAST_WITHIN * index, z_above > _LEAST_ABOVE], -1)
-    return PortFactors(scale, far[..., :, None] & far[..., None, :] & (scale > 0.0))
+    return scale, far[..., :, None] & far[..., None, :] & (scale > 0.0)
 
 
 def reduced(table: OrderTable, band: Band, kind: int) -> Array:
     """Return the reduced efficiencies e (τ, ρ, w, j, q); 0 in order 0 of the reflection."""
-    assert table.block is not None
+    index = table.block
+    assert index is not None
     values = band.kind(kind)[..., 0].astype(np.float64)
     tau, rho, w = (cells.even_nodes(n)[..., None] for n in band.counts)
     tau, rho = tau[:, None, None], rho[:, None]
@@ -72,8 +64,7 @@ def reduced(table: OrderTable, band: Band, kind: int) -> Array:
     lam = cells.wavelength_of(band.k + cells.sine_squared(rho), w, table.wavelengths, optical)
     channels = np.arange(values.shape[-1] // 2)
     light = cells.from_cell(band.k, kind, channels, tau, rho, lam, optical)
-    scale, known = factors(table.block * light.x, table.block * light.y, table.block)
-    return divided(values, scale, known)
+    return divided(values, *factors(index * light.x, index * light.y, index))
 
 
 def divided(values: Array, scale: Array, known: NDArray[np.bool_]) -> Array:

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, warn
 from ..reference.boundary import mueller as mueller_matrices
+from ..reference.boundary import polarisation_axes, turn
 from .cells import Array
 from .grid import OrderGrid, grid_of
 from .listed import listed_jones
 from .listed_lookup import ListedLookup
 from .lookup import Arrays, BlockLookup, Lookup, Memory
-from .polarised import IN_PLANE, TurnedAxes, nearest_jones, s_and_p, turned_axes
+from .polarised import IN_PLANE, TurnedAxes, nearest_jones, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
 
@@ -107,9 +108,7 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
     """
     at = _Light(table, *light, **sides)
     mean, difference, _ = _linear(at)
-    turned = (
-        np.abs(turned_axes(*(np.asarray(part, np.float64) for part in at[1:3])).sine) > IN_PLANE
-    )
+    turned = np.abs(_turned(at).sine) > IN_PLANE
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
@@ -159,11 +158,11 @@ def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
     """Return the Jones matrices of an order about s and p, as ray tracers take them.
 
     E_leaving = J E_incident times the root of the ratio of cosines: |J|² are shares of the light.
-    s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d (`polarised.s_and_p`). Time
-    is exp(−iωt), and fields are those at the profile's origin; of crossed gratings it is the first
-    of the heights, at their lowest level. Light that was solved itself, at one of the listed
-    directions and wavelengths, has its phases; of other light J_ss is real, or J_pp where there is
-    no J_ss. Arguments as for `efficiency`.
+    s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d. Time is exp(−iωt), and
+    fields are those at the profile's origin; of crossed gratings it is the first of the heights, at
+    their lowest level. Light that was solved itself, at one of the listed directions and
+    wavelengths, has its phases; of other light J_ss is real, or J_pp where there is no J_ss.
+    Arguments as for `efficiency`.
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
@@ -179,7 +178,10 @@ def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
         np.stack([a, b, side * np.sqrt(np.maximum(1.0 - a * a - b * b, 0.0))], axis=-1)
         for (a, b), side in (((x, y), -1.0), (leaving, 1.0))
     )
-    found = s_and_p(of_grooves, towards, away)
+    s_in, s_out = polarisation_axes(-towards, away)
+    e_in, e_out = (np.array([0.0, 1.0, 0.0]) - d[..., 1:2] * d for d in (towards, away))
+    e_in, e_out = (e / np.linalg.norm(e, axis=-1, keepdims=True) for e in (e_in, e_out))
+    found = turn(s_out, e_out, away) @ of_grooves @ turn(e_in, s_in, towards)
     size = np.abs(found[..., 0, 0])
     reference = np.where(size > 1e-9, found[..., 0, 0], found[..., 1, 1])
     phase = np.where(with_phase, 1.0, np.exp(-1j * np.angle(reference)))

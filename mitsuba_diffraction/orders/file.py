@@ -24,6 +24,7 @@ import json
 import math
 import os
 import shlex
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ from ..errors import DiffractionError, one_line
 from ..files import ORDERS_ATTRIBUTE, FileKind, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES
 from ..tables.fields import mapping
+from ..tables.store import loaded_once
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
@@ -44,6 +46,8 @@ FORMAT_VERSION = 2
 SUFFIX = ".nc"
 _AGAIN = "solve it again with the command 'solve', or import its efficiencies again"
 _LISTED, _PHASES = "efficiency", "phase"
+
+_tables: weakref.WeakValueDictionary[str, OrderTable] = weakref.WeakValueDictionary()
 
 
 def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
@@ -88,13 +92,13 @@ def _add_response(file: Any, table: OrderTable) -> None:
             ("wavelength", "theta", "phi"), response.axes, ("nm", *["degree"] * 2), strict=True
         )
         for name, values, unit in axes:
-            _add(file, name, (name,), values.astype(">f8"), unit)
+            add_variable(file, name, (name,), values.astype(">f8"), unit)
         for name, column in zip(("order_x", "order_y"), response.orders.T, strict=True):
-            _add(file, name, ("order",), column.astype(">i4"))
+            add_variable(file, name, ("order",), column.astype(">i4"))
         every = ("wavelength", "theta", "phi", "side", "port", "element")
-        _add(file, _LISTED, every, response.values.astype(">f4"))
+        add_variable(file, _LISTED, every, response.values.astype(">f4"))
         if response.phases is not None:
-            _add(file, _PHASES, every[:-1], response.phases.astype(">f4"), "radian")
+            add_variable(file, _PHASES, every[:-1], response.phases.astype(">f4"), "radian")
         return
     if response.even:
         file.even = np.int32(1)
@@ -105,13 +109,13 @@ def _add_response(file: Any, table: OrderTable) -> None:
                 *(f"{axis}_{kind}_{band.k}" for axis in ("j", "q")),
                 "element",
             )
-            _add(file, f"kind_{kind}_{band.k}", names, numbers.astype(">f4"))
+            add_variable(file, f"kind_{kind}_{band.k}", names, numbers.astype(">f4"))
 
 
-def _add(
+def add_variable(
     file: Any, name: str, axes: tuple[str, ...], numbers: NDArray[Any], units: str = "1"
 ) -> None:
-    """Add a variable, and the dimensions that the file lacks."""
+    """Add a variable to an open NetCDF file, and the dimensions that the file lacks."""
     for axis, size in zip(axes, numbers.shape, strict=True):
         if axis not in file.dimensions:
             file.createDimension(axis, size)
@@ -143,6 +147,11 @@ def load_orders(path: str | os.PathLike[str]) -> OrderTable:
         raise DiffractionError(
             f"'{path}' is a damaged table of orders ({one_line(str(error))[:100]}); {_AGAIN}"
         ) from error
+
+
+def loaded_orders(path: str | os.PathLike[str]) -> OrderTable:
+    """Load a file once for all that use it at the same time."""
+    return loaded_once(path, load_orders, _tables)
 
 
 def _advice(path: Path) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,10 +98,11 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
             values = smooth_elements(table, of.band, values)
         return resampled(table, of.band, values, counts, coated).reshape(-1, values.shape[-1])
 
-    starts, corners = _stacked(table, records)
+    kinds = list(kinds_of(table))
+    starts, corners = _joined(list(map(records, kinds)))
     matrices, element_starts = None, starts
     if elements and table.response.elements > 1:
-        element_starts, matrices = _stacked(table, nodes)
+        element_starts, matrices = _joined(list(map(nodes, kinds)))
     grid = _scaled(counts, starts, corners, matrices, element_starts)
     if not chances or table.block:
         return grid
@@ -169,13 +169,6 @@ def corner_records(values: Array) -> Array:
     whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
     pairs = itertools.product((slice(-1), slice(1, None)), repeat=3)
     return np.stack([whole[pair] for pair in pairs], axis=-1).reshape(-1, 8)
-
-
-def _stacked(
-    table: OrderTable, records: Callable[[Kind], Array]
-) -> tuple[NDArray[np.uint32], Array]:
-    """Return the first record of each kind of each band, and all records."""
-    return _joined([records(of) for of in kinds_of(table)])
 
 
 def _joined(parts: list[Array]) -> tuple[NDArray[np.uint32], Array]:

@@ -117,17 +117,10 @@ def listed_response(
     in_plane = not crossed and bool(np.isin(azimuths, (0.0, 180.0)).all())
     phases = None
     if lights.jones is not None:
-        phases = _phases(stored, matrices.view(np.complex128).reshape(*stored.shape[:-1], 4))
+        entries = matrices.view(np.complex128).reshape(*stored.shape[:-1], 4)
+        angles = np.angle((_pure(stored).conj() * entries).sum(axis=-1))
+        phases = np.where(np.isnan(angles), np.float32(np.nan), angles.astype(np.float32))
     return ListedResponse(axes, orders, stored, in_plane, phases=phases)
-
-
-def _phases(elements: NDArray[np.float32], matrices: Complex) -> NDArray[np.float32]:
-    """Return phases (…) of Jones matrices (…, 4) relative to the matrices of `_pure`.
-
-    Matrices of NaN have phases of NaN.
-    """
-    phases = np.angle((_pure(elements).conj() * matrices).sum(axis=-1))
-    return np.where(np.isnan(phases), np.float32(np.nan), phases.astype(np.float32))
 
 
 def _pure(elements: NDArray[np.float32]) -> Complex:

@@ -19,6 +19,7 @@ from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .cells import Array as Real
 from .efficiency import jones_matrices
+from .file import add_variable
 from .listed import mirror_of
 from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, axes_of, check_light
 from .polarised import MIN_ANGLE
@@ -77,14 +78,11 @@ class Listing(NamedTuple):
         with atomic_path(path) as temporary, netcdf_file(str(temporary), "w") as file:
             units = "nm", "degrees", "degrees", "1", "1"
             for name, unit, along in zip(names, units, axes, strict=False):
-                file.createDimension(name, len(along))
-                variable = file.createVariable(name, "d", (name,))
-                variable[:], variable.units = along, unit
+                add_variable(file, name, (name,), along, unit)
             for name, column in zip(self.columns[len(names) :], numbers, strict=True):
                 values = np.full([len(along) for along in axes], np.nan)
                 values[places] = column
-                variable = file.createVariable(name, "d", names)
-                variable[:], variable.units = values, "1"
+                add_variable(file, name, names, values)
 
 
 def list_orders(
@@ -123,7 +121,12 @@ def list_orders(
             f"{high:g} nm"
         )
     orders = orders_of(table, lights[0][0])
-    _check_count(lights, len(orders))
+    count = np.prod([len(axis) for axis in lights], dtype=float) * len(orders)
+    if count > _MOST_LINES:  # more than can be read again
+        raise DiffractionError(
+            f"these wavelengths and angles make {count:.2g} lines, {_MOST_LINES} are allowed; "
+            "choose fewer"
+        )
     lam, polar, azimuth, n = (
         axis.ravel() for axis in np.meshgrid(*lights, np.arange(len(orders)), indexing="ij")
     )
@@ -143,7 +146,8 @@ def list_orders(
     axes = (*CSV_AXES[:3], *(PAIR if table.crossed else CSV_AXES[3:]))
     if jones:
         matrices, with_phase = jones_matrices(table, x, y, lam, m_x, m_y)
-        shares = [part for n in range(4) for part in _parts(matrices[:, n // 2, n % 2])]
+        entries = matrices.reshape(-1, 4).T
+        shares = [part for entry in entries for part in (entry.real, entry.imag)]
         return Listing(
             (*axes, *JONES, WITH_PHASE),
             np.column_stack([lam, polar, azimuth, *numbers, *shares, with_phase]),
@@ -160,23 +164,9 @@ def list_orders(
     return Listing((*axes, *kinds), np.column_stack([lam, polar, azimuth, *numbers, *shares]))
 
 
-def _parts(numbers: NDArray[np.complex128]) -> tuple[Real, Real]:
-    return numbers.real, numbers.imag
-
-
 def orders_of(table: OrderTable, shortest: float) -> NDArray[np.int64]:
     """Return all orders (m, 2) that may propagate from some wavelength on, nm."""
     if isinstance(table.response, ListedResponse):
         return table.response.orders
     most = int(np.ceil(2e3 * table.optical_period / shortest))
     return orders_between((-most, 0), (most, 0))
-
-
-def _check_count(lights: list[Real], orders: int) -> None:
-    """Refuse more lines than can be read again."""
-    count = np.prod([len(axis) for axis in lights], dtype=float) * orders
-    if count > _MOST_LINES:
-        raise DiffractionError(
-            f"these wavelengths and angles make {count:.2g} lines, {_MOST_LINES} are allowed; "
-            "choose fewer"
-        )

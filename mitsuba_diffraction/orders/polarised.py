@@ -14,7 +14,7 @@ mends it, so that no matrix gains light or polarisation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,6 @@ IN_PLANE = 1e-7
 #: Angle from the normal, degrees, that stands for 0 where the plane of incidence matters.
 MIN_ANGLE = 1e-4
 _MIN_AMPLITUDE = 1e-12
-#: Sine of the angle from the normal below which a direction has no s of its own.
-_NORMAL = 1e-9
 
 
 class TurnedAxes(NamedTuple):
@@ -129,30 +127,3 @@ def nearest_jones(m: Sequence[Number]) -> Jones:
     inverse = xp.reciprocal(xp.sqrt(power))
     ss, sp, ps, pp = (entry * inverse for entry in vector)
     return ss, sp, ps, pp
-
-
-def s_and_p(jones: NDArray[np.complex128], incident: Array, leaving: Array) -> Any:
-    """Return Jones matrices about s and p of those about e and f.
-
-    s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d; along the normal s is that
-    of the other direction.
-
-    incident, leaving : directions of propagation (…, 3).
-    """
-
-    def turned(direction: Array, other: Array) -> Array:
-        """Return the matrix that takes components along e and f to those along s and p."""
-        x, y = (np.where(_level(direction), other[..., k], direction[..., k]) for k in (0, 1))
-        s = np.stack([-y, x, 0.0 * x], axis=-1) / np.maximum(np.hypot(x, y), 1e-300)[..., None]
-        along = np.array([0.0, 1.0, 0.0]) - direction[..., 1:2] * direction
-        along /= np.linalg.norm(along, axis=-1, keepdims=True)
-        cosine = (s * along).sum(axis=-1)
-        sine = (s * np.cross(direction, along)).sum(axis=-1)
-        return np.stack([np.stack([cosine, sine], -1), np.stack([-sine, cosine], -1)], -2)
-
-    back = turned(incident, leaving).swapaxes(-1, -2)
-    return turned(leaving, incident) @ jones @ back
-
-
-def _level(direction: Array) -> Any:
-    return np.hypot(direction[..., 0], direction[..., 1]) < _NORMAL

@@ -130,11 +130,6 @@ class OrderTable:
         return low * 2.0**-MARGIN, high * 2.0**MARGIN
 
     @property
-    def layout(self) -> str:
-        """Size of the grid, for people."""
-        return self.response.layout
-
-    @property
     def sides(self) -> int:
         """Number of sides with light: 2 of a thin sheet or a block, else 1."""
         return 2 if self.thin or self.block else 1
@@ -219,7 +214,7 @@ class OrderTable:
             "thin_sheet": self.thin,
             "block_index": self.block,
             "polarised": self.polarised,
-            "grid": self.layout,
+            "grid": self.response.layout,
             "mean_albedo": round(self.albedo, 4),
             "memory_mb": round(self.nbytes / 1e6, 2),
             **self.header,
@@ -240,23 +235,9 @@ class OrderTable:
         medium = f", block of index {self.block:g}" if self.block else medium
         medium += ", polarised" if self.polarised else ""
         return (
-            f"OrderTable({periods}{medium}, {low:g}–{high:g} nm, {self.layout}, "
+            f"OrderTable({periods}{medium}, {low:g}–{high:g} nm, {self.response.layout}, "
             f"{self.nbytes / 1e6:.1f} MB)"
         )
-
-
-def check_wavelengths(wavelengths: Sequence[float]) -> tuple[float, float]:
-    """Return the shortest and the longest wavelength, nm.
-
-    Raises a DiffractionError with the allowed values.
-    """
-    low, high = map(float, wavelengths)
-    if not WAVELENGTHS[0] <= low <= high <= WAVELENGTHS[1]:
-        raise DiffractionError(
-            f"wavelengths={low:g}, {high:g} nm must rise from {WAVELENGTHS[0]:g} to "
-            f"{WAVELENGTHS[1]:g} nm"
-        )
-    return low, high
 
 
 def check_outline(
@@ -279,7 +260,12 @@ def check_outline(
             raise DiffractionError(
                 f"period={period:g} µm must be {PERIODS[0]:g} to {PERIODS[1]:g} µm"
             )
-    low, high = check_wavelengths(wavelengths)
+    low, high = map(float, wavelengths)
+    if not WAVELENGTHS[0] <= low <= high <= WAVELENGTHS[1]:
+        raise DiffractionError(
+            f"wavelengths={low:g}, {high:g} nm must rise from {WAVELENGTHS[0]:g} to "
+            f"{WAVELENGTHS[1]:g} nm"
+        )
     if not 1.0 <= superstrate <= 5.0:
         raise DiffractionError(f"superstrate={superstrate:g} must be an index of 1 to 5")
     if math.isfinite(periods[1]) and (superstrate != 1.0 or thin or block is not None):

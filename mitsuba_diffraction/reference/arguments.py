@@ -16,7 +16,7 @@ from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import COHERENCES, SURFACE, TableSettings, checked
 from .model import Light
-from .screens import ScanWindows, Sigmas
+from .screens import LOOKUP, Sigmas
 
 
 def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
@@ -35,8 +35,7 @@ def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
     width, taper = window_and_taper(TableSettings(), [field], width)
     if taper is None:
         return Sigmas(sigma_of(width), sigma_of(light))
-    windows = ScanWindows(width)
-    return Sigmas(windows.lookup, sigma_of(light), windows)
+    return Sigmas(LOOKUP * sigma_of(width), sigma_of(light), width)
 
 
 class Window(NamedTuple):
@@ -82,8 +81,21 @@ def model_of(
     model: str | None,
     index: NDArray[np.complex128] | Filmed | None,
     models: Iterable[str] = MODELS,
+    coat: float | None = None,
 ) -> str:
-    """Return the name of the model, one of `models`; with an index the default is "small_slope"."""
+    """Return the name of the model, one of `models`; with an index the default is "small_slope".
+
+    coat : index of a coat over the surface, which is checked.
+    """
+    if coat is not None:
+        if index is None:
+            raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
+        if isinstance(index, Filmed):
+            raise DiffractionError(
+                f"coat={coat} and a film exclude each other: leave one of them out"
+            )
+        if not (np.isfinite(coat) and coat >= 1.0):
+            raise DiffractionError(f"coat={coat} must be an index of at least 1")
     if model is None:
         return "kirchhoff" if index is None else "small_slope"
     if checked_model(model, models) != "kirchhoff" and index is None:
@@ -105,7 +117,19 @@ def index_of(
         if film is not None:
             raise DiffractionError(f"film={film} needs an index beneath it: give eta (and k)")
         return None
-    index = _complex(eta, k, wavelength.shape)
+    real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
+    if not (np.all(np.isfinite(real)) and np.all(real > 0)):
+        raise DiffractionError(f"eta={real} must be positive and finite")
+    if not (np.all(np.isfinite(imaginary)) and np.all(imaginary >= 0)):
+        raise DiffractionError(
+            f"k={imaginary} must be finite and at least 0: the index is eta + ik"
+        )
+    try:
+        index = np.broadcast_to(real + 1j * imaginary, wavelength.shape)
+    except ValueError as error:
+        raise DiffractionError(
+            f"eta {real.shape} and k {imaginary.shape} do not fit {len(wavelength)} directions"
+        ) from error
     if film is None:
         return index
     layer, thickness = complex(film[0]), float(film[1])
@@ -115,22 +139,6 @@ def index_of(
             "thickness of at least 0 nm"
         )
     return Filmed(index, layer, wavenumber(wavelength) * thickness * 1e-3)
-
-
-def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.complex128]:
-    real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
-    if not (np.all(np.isfinite(real)) and np.all(real > 0)):
-        raise DiffractionError(f"eta={real} must be positive and finite")
-    if not (np.all(np.isfinite(imaginary)) and np.all(imaginary >= 0)):
-        raise DiffractionError(
-            f"k={imaginary} must be finite and at least 0: the index is eta + ik"
-        )
-    try:
-        return np.broadcast_to(real + 1j * imaginary, shape)
-    except ValueError as error:
-        raise DiffractionError(
-            f"eta {real.shape} and k {imaginary.shape} do not fit {shape[0]} directions"
-        ) from error
 
 
 def directions_of(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Light:

@@ -55,7 +55,7 @@ def mueller(jones: ArrayLike) -> Real:
 
 def _horizontal(direction: Real) -> tuple[Real, NDArray[np.bool_]]:
     """ẑ×d normalised (arbitrary along the normal), and whether d differs from the normal."""
-    x, y = _xy(direction)
+    x, y = direction[..., 0], direction[..., 1]
     length = np.hypot(x, y)
     slanted = length > _NORMAL
     safe = np.where(slanted, length, 1.0)
@@ -82,7 +82,3 @@ def jones_matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) 
     """[[ss, sp], [ps, pp]]; the first letter is the outgoing polarisation."""
     entries = np.broadcast_arrays(*(np.asarray(x, np.complex128) for x in (ss, sp, ps, pp)))
     return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)
-
-
-def _xy(vector: Real) -> tuple[Real, Real]:
-    return vector[..., 0], vector[..., 1]

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
-from ..optics.boundary import Heights, Model, geometry
+from ..optics.boundary import Heights, geometry
 from ..optics.boundary import model_of as registered_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import kirchhoff_factor, wavenumber
@@ -23,12 +23,11 @@ from . import boundary
 from . import coat as coats
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
+from .boundary import Complex, Real
 from .integral import window_powers
 from .mirror import horizon_correction, interfering
 from .model import Light
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 #: A measure of Jones matrices (n, 2, 2): N of unpolarised light (n,), or Mueller matrices.
 Measure = Callable[[Complex], Real]
 
@@ -79,7 +78,7 @@ def brdf(
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
-    name = _model_of(model, index, coat)
+    name = model_of(model, index, coat=coat)
     if index is None:
         others, zeroth, cosine = window_powers(field, *light, *window)
         others *= kirchhoff_factor(*light, window.sigmas.orders)
@@ -112,24 +111,10 @@ def mueller(
     light = directions_of(wi, wo, wavelength)
     window = window_of(coherence_width, field, coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
-    name = _model_of(model, index, coat)
+    name = model_of(model, index, coat=coat)
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
     return _reflected(boundary.mueller, field, light, window, name, index, coat)
-
-
-def _model_of(model: str | None, index: Complex | Filmed | None, coat: float | None) -> str:
-    """Return the name of the model, after a check of what goes together."""
-    if coat is not None:
-        if index is None:
-            raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
-        if isinstance(index, Filmed):
-            raise DiffractionError(
-                f"coat={coat} and a film exclude each other: leave one of them out"
-            )
-        if not (np.isfinite(coat) and coat >= 1.0):
-            raise DiffractionError(f"coat={coat} must be an index of at least 1")
-    return model_of(model, index)
 
 
 def _reflected(
@@ -144,36 +129,25 @@ def _reflected(
     """Measured light where both directions are above the surface, 0 elsewhere."""
     lit = (light.wi[:, 2] > 0) & (light.wo[:, 2] > 0)
     values = measure(np.zeros((len(lit), 2, 2), complex))
-    if lit.any():
-        above = Light(*(part[lit] for part in light))
-        values[lit] = _lit(measure, field, above, window.at(lit), name, index[lit], coat)
-    return values
-
-
-def _lit(
-    measure: Measure,
-    field: HeightField,
-    light: Light,
-    window: Window,
-    name: str,
-    index: Complex | Filmed,
-    coat: float | None,
-) -> Real:
-    """Measured light of directions above the surface."""
+    if not lit.any():
+        return values
+    light, window, index = Light(*(part[lit] for part in light)), window.at(lit), index[lit]
+    averaged = window.coherence == COHERENCES[0]
     if coat is not None:
         assert not isinstance(index, Filmed)
         inside, relative = coats.refracted_light(light, coat), index / coat
         jones = _matrices(field, inside, relative, name)
         powers = window_powers(field, *inside, *window)
-        return coats.reflected(light, window.sigmas, coat, relative, powers, jones, measure)
-    averaged = window.coherence == COHERENCES[0]
-    if name == "small_slope" and averaged and not isinstance(index, Filmed):
-        return models.default_brdf(field, light, index, window.sigmas, measure)
-    jones = _matrices(field, light, index, name)
-    others, zeroth, cosine = window_powers(field, *light, *window)
-    rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
-    mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
-    return interfering(rest, mirror, cosine)
+        values[lit] = coats.reflected(light, window.sigmas, coat, relative, powers, jones, measure)
+    elif name == "small_slope" and averaged and not isinstance(index, Filmed):
+        values[lit] = models.default_brdf(field, light, index, window.sigmas, measure)
+    else:
+        jones = _matrices(field, light, index, name)
+        others, zeroth, cosine = window_powers(field, *light, *window)
+        rest = models.reflected(light, window.sigmas.orders, others, jones, measure)
+        mirror = models.mirrored(light, window.sigmas, zeroth, index, measure)
+        values[lit] = interfering(rest, mirror, cosine)
+    return values
 
 
 def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: str) -> Complex:
@@ -182,11 +156,8 @@ def _matrices(field: HeightField, light: Light, index: Complex | Filmed, name: s
         return models.kirchhoff(light.wi, light.wo, index)
     if name == "small_slope":
         return models.blended(light.wi, light.wo, index, models.share(field, light, index))
-    return registered(registered_model(name), field, light, index)
-
-
-def registered(model: Model, field: HeightField, light: Light, index: Complex | Filmed) -> Complex:
-    """J (n, 2, 2) of a registered model by its own formula, for heights without a table."""
+    # a registered model by its own formula, for heights without a table
+    model = registered_model(name)
     (x0, y0, z0), (x, y, z) = light.wi.T, light.wo.T
     heights = None
     if model.statistic is not None:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..optics.geometry import wavenumber
 from . import model
+from .boundary import Complex, Real
 from .fresnel import amplitudes
 from .mirror import horizon_correction, interfering, mirror_cosine
 from .model import Light
 from .screens import Sigmas
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def refracted_light(light: Light, coat: float) -> Light:
@@ -99,9 +97,6 @@ def transmitted(
 def _mirrors(outside: Real, n: float, index: ArrayLike) -> tuple[Real, Real]:
     """R_s and R_p of the face, the same from both sides, and of the flat structure, (..., 2)."""
     within = refracted(outside, n)[..., 2]
-    face, structure = amplitudes(outside[..., 2], n), amplitudes(within, index)
-    return _powers(*face), _powers(*structure)
-
-
-def _powers(r_s: Complex, r_p: Complex) -> Real:
-    return np.asarray(np.abs(np.stack([r_s, r_p], axis=-1)) ** 2)
+    both = amplitudes(outside[..., 2], n), amplitudes(within, index)
+    face, structure = (np.asarray(np.abs(np.stack(pair, axis=-1)) ** 2) for pair in both)
+    return face, structure

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..optics.fresnel import Filmed, Index
-
-Complex = NDArray[np.complex128]
+from .boundary import Complex, Real
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def faces(cosine: ArrayLike, squared_sine: ArrayLike, index: Index) -> list[Inte
     ]
 
 
-def _film(square: NDArray[np.float64], index: Filmed) -> tuple[Complex, ...]:
+def _film(square: Real, index: Filmed) -> tuple[Complex, ...]:
     """ε of material and film, q of the film, one passage's phase, r_s and r_p of the lower face."""
     material, film, depth = index.parts
     epsilon, layer = material * material, film * film
@@ -109,7 +108,7 @@ def decaying_root(square: Complex) -> Complex:
     return np.where(root.imag < 0, -root, root)
 
 
-def reflectance(cos_theta: ArrayLike, index: Index) -> NDArray[np.float64]:
+def reflectance(cos_theta: ArrayLike, index: Index) -> Real:
     """Fresnel reflectance for unpolarised light, the mean of both polarisations.
 
     Born and Wolf, Principles of Optics, section 1.5.2 (eq. 20 and 21), with a complex index
@@ -129,5 +128,5 @@ def reflectance(cos_theta: ArrayLike, index: Index) -> NDArray[np.float64]:
     return np.where(perfect, 1.0, _mean_power(*amplitudes(cosine, np.where(perfect, 1.0, n))))
 
 
-def _mean_power(r_s: Complex, r_p: Complex) -> NDArray[np.float64]:
+def _mean_power(r_s: Complex, r_p: Complex) -> Real:
     return np.asarray(0.5 * (np.abs(r_s) ** 2 + np.abs(r_p) ** 2))

@@ -20,10 +20,9 @@ from numpy.typing import ArrayLike
 from ..errors import DiffractionError
 from ..optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from .arguments import directions_of
+from .boundary import Real
 from .fresnel import reflectance
 from .mirror import horizon_correction
-
-Real = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 #: Efficiency of order m: from x, y, the wavelength (nm) and m, arrays of one shape. x and y are
 #: direction cosines within the layer of the mirror direction, −ωi; see `orders.cells`.
@@ -70,21 +69,18 @@ def orders_brdf(
         if near.any():
             if m == 0:
                 lobe *= horizon_correction(light, sigma)
-            at = light.wi[near], light.wavelength[near]
-            result[near] += lobe[near] * _powers(efficiency, period, superstrate, *at, m)
+            # η_m as seen from outside of the layer
+            x, y = (-light.wi[near, axis] / superstrate for axis in (0, 1))
+            lam = light.wavelength[near]
+            if superstrate == 1.0:
+                powers = efficiency(x, y, lam, np.full(len(x), m))
+            else:
+                lights = zip(x, y, lam, strict=True)
+                powers = np.array(
+                    [_coated(efficiency, period, superstrate, *each, m) for each in lights]
+                )
+            result[near] += lobe[near] * powers
     return np.where((light.wi[:, 2] > 0.0) & (light.wo[:, 2] > 0.0), result, 0.0)
-
-
-def _powers(
-    efficiency: Efficiency, period: float, index: float, wi: Real, wavelength: Real, m: int
-) -> Real:
-    """Return η_m as seen from outside of the layer."""
-    x, y = -wi[:, 0] / index, -wi[:, 1] / index
-    if index == 1.0:
-        return efficiency(x, y, wavelength, np.full(len(x), m))
-    return np.array(
-        [_coated(efficiency, period, index, *row, m) for row in zip(x, y, wavelength, strict=True)]
-    )
 
 
 def _coated(

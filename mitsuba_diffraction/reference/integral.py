@@ -15,13 +15,12 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..heights.field import HeightField
+from .boundary import Complex, Real
 from .model import Light, ensemble_power, window_sums
 from .screens import Orders, Sigmas, Sums, orders_near
-
-Real = NDArray[np.float64]
 
 
 def window_power(
@@ -83,7 +82,7 @@ def _one_window(
 
 
 def screen_power(
-    screen: NDArray[np.complex128],
+    screen: Complex,
     pixel_size: tuple[float, float],
     alpha: float,
     beta: float,

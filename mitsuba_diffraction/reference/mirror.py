@@ -9,13 +9,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..optics import mirror
 from ..optics.geometry import wavenumber
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from .boundary import Real
 
 # Nodes of X up to _REACH, beyond which C is 1; steps of the iteration
 _NODES, _REACH, _STEPS = 600, 8.0, 200

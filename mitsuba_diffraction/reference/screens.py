@@ -27,33 +27,23 @@ from numpy.typing import NDArray
 from ..heights.coherence import window_corners, window_places
 from ..heights.field import HeightField
 from ..heights.preprocess import plane_of
+from .boundary import Complex, Real
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+#: σ_l over σ.
+LOOKUP = 1.65
 #: t along y and along x; None along an axis without change of height, which tiles.
 Tapers = tuple[Real | None, Real | None]
-
-
-class ScanWindows(NamedTuple):
-    """Width W of the windows of a scan, µm."""
-
-    width: float
-
-    @property
-    def lookup(self) -> float:
-        """σ_l, µm."""
-        return 1.65 * 0.25 * self.width
 
 
 class Sigmas(NamedTuple):
     """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
 
-    `windows`: a scan's, which does not tile the plane.
+    `windows`: width W of those of a scan, which does not tile the plane, µm.
     """
 
     orders: float
     zeroth: float
-    windows: ScanWindows | None = None
+    windows: float | None = None
 
 
 class Orders(NamedTuple):
@@ -74,7 +64,7 @@ Sums = Callable[[Orders, tuple[float, float], Sigmas], tuple[float, float, float
 def patch_power(
     field: HeightField, kappa: float, q: tuple[float, float], sigmas: Sigmas, sums: Sums
 ) -> Real:
-    """`sums` at q and κ, (3,); means over the windows of a"""
+    """`sums` at q and κ, (3,); means over the windows of a scan."""
     parts, tapers = parts_of(field, sigmas.windows), tapers_of(field, sigmas.windows)
     screens = (np.exp(1j * kappa * part) for part in parts)
     orders = (orders_near(q, sigmas.orders, s, field.pixel_size, tapers) for s in screens)
@@ -104,11 +94,11 @@ def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Com
     return j * spacing, np.exp(2j * np.pi / n * turns)
 
 
-def parts_of(field: HeightField, windows: ScanWindows | None) -> list[Real]:
+def parts_of(field: HeightField, windows: float | None) -> list[Real]:
     """Heights (ny, nx) of the windows, µm; of the whole patch, without, if it tiles the plane."""
     if windows is None:
         return [field.heights]
-    (rows, ny), (columns, nx) = _places(field, windows.width)
+    (rows, ny), (columns, nx) = _places(field, windows)
     cuts = [field.heights[y : y + ny, x : x + nx] for y, x in window_corners(rows, columns)]
     dx, dy = field.pixel_size
     tapers = tapers_of(field, windows) or (None, None)
@@ -122,12 +112,12 @@ def parts_of(field: HeightField, windows: ScanWindows | None) -> list[Real]:
     return levelled
 
 
-def tapers_of(field: HeightField, windows: ScanWindows | None) -> Tapers | None:
+def tapers_of(field: HeightField, windows: float | None) -> Tapers | None:
     """Tapers of the windows; None if the patch tiles the plane."""
     if windows is None:
         return None
     found: list[Real | None] = []
-    for axis, (_, n) in enumerate(_places(field, windows.width)):
+    for axis, (_, n) in enumerate(_places(field, windows)):
         turn = 2 * np.pi / n * (np.arange(n) - 0.5 * (n - 1))
         taper = 1 + 0.465 * np.cos(turn) - 0.145 * np.cos(2 * turn)
         found.append(taper if field.varies_along(axis) else None)

@@ -34,8 +34,6 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..settings import BASES as BASES
-
 KINDS = ("power", "amplitude")
 
 _DARK = 1e-3  # the share of the brightest that tables.build.error compares the darkest κ with

@@ -163,9 +163,9 @@ def weighted_sum(
         weight_y = weight_y * _phases(row, taps[1], grid.last[1], place[1], table.spacing[1])
 
     total: Any = np.zeros(len(qx))
-    trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
-    for j, trim in enumerate(trims):
-        for i in range(trim, taps[0] - trim):
+    columns = grid.tapped() if taps == grid.taps else [range(taps[0])] * taps[1]
+    for j, row_columns in enumerate(columns):
+        for i in row_columns:
             packet = table.coefficients[interval, row + j, column + i].astype(float)
             value = _bin_value(table, np.einsum("npt,nt->np", packet, scaled))
             total = total + weight_x[:, i] * weight_y[:, j] * value

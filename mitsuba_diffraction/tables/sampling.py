@@ -91,7 +91,10 @@ def proposals(table: DiffractionTable) -> Proposals:
             rows[band] = _cumulative(of_row)
             columns[band] = _cumulative(power)
     lobes = (x.lobes, y.lobes)
-    return Proposals(origin, cell, lobes, levels, units, rows, columns, _order_0(table))
+    # close enough together for a share of the samples
+    kappas = np.linspace(0.0, table.expansion.kappa_max, _ORDER_0_KAPPAS)
+    order_0 = np.clip(order_0_power(table, kappas), 0.0, 1.0).astype(np.float32)
+    return Proposals(origin, cell, lobes, levels, units, rows, columns, order_0)
 
 
 class _Cells(NamedTuple):
@@ -125,12 +128,6 @@ def _levels(power: NDArray[np.float64]) -> NDArray[np.uint8]:
 def density_of(levels: NDArray[np.uint8] | np.uint8) -> NDArray[np.float64]:
     """Density of a cell for its level, in no particular unit."""
     return (np.asarray(levels, np.uint32) << SHIFT).view(np.float32).astype(float)
-
-
-def _order_0(table: DiffractionTable) -> NDArray[np.float32]:
-    """Power of order 0 at κs close enough together for a share of the samples."""
-    kappas = np.linspace(0.0, table.expansion.kappa_max, _ORDER_0_KAPPAS)
-    return np.clip(order_0_power(table, kappas), 0.0, 1.0).astype(np.float32)
 
 
 def _cell_power(

@@ -16,8 +16,7 @@ from typing import Any
 from ..errors import DiffractionError, warn
 from ..files import FileKind
 from ..heights.coherence import LOOKUP, SHARPENING, TAPER
-from ..heights.load import notes_line
-from ..heights.source import Source
+from ..heights.source import Source, notes_line
 from ..progress import Progress, silent
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from .build.build import build_with
@@ -135,11 +134,6 @@ def providing(provider: TableProvider) -> Iterator[None]:
         _providers.remove(provider)
 
 
-def table_key(digest: str, settings: TableSettings) -> str:
-    """Return the key of the table of heights with this digest, built with these settings."""
-    return key_of(FORMAT_VERSION, digest, asdict(settings), TAPER, LOOKUP, SHARPENING, LEAST_HALF)
-
-
 def cached_table(
     digest: str,
     settings: TableSettings,
@@ -150,7 +144,7 @@ def cached_table(
 
     names : of the patches. The file in the cache has none: patches of other names may be equal.
     """
-    key = table_key(digest, settings)
+    key = key_of(FORMAT_VERSION, digest, asdict(settings), TAPER, LOOKUP, SHARPENING, LEAST_HALF)
     return named(cached("table", key, _tables, build, to_record, from_record), names)
 
 

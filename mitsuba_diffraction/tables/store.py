@@ -120,7 +120,10 @@ def _from_disk(
             value = _found(path, title, unpack)  # made by whoever was waited for
             if value is None:
                 value = make()
-                _keep(path, title, pack(value))
+                record = pack(value)
+                with contextlib.suppress(DiffractionError, OSError):
+                    write_record(path, title, record)
+                    _prune(path.parent)
     return value
 
 
@@ -189,14 +192,6 @@ def read_record(path: Path, title: str) -> Record:
         arrays.append(content[place : place + size].view(kind).reshape(shape))
         place += _aligned(size)
     return Record(header["document"], arrays)
-
-
-def _keep(path: Path, title: str, record: Record) -> None:
-    try:
-        write_record(path, title, record)
-        _prune(path.parent)
-    except (DiffractionError, OSError):
-        return
 
 
 def write_record(path: Path, title: str, record: Record) -> None:

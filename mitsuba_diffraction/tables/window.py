@@ -86,7 +86,9 @@ def trims_for(
     """
     if taps[0] * taps[1] > _MOST_TRIMMED:
         return ()
-    shares = [_tap_shares(step, count) for step, count in zip(steps, taps, strict=True)]
+    # each tap's share of ∫exp(−s²Δ²) along one direction, the mean over positions
+    edges = (step * (np.arange(n + 1) - 0.5 * n) for step, n in zip(steps, taps, strict=True))
+    shares = [0.5 * np.diff(scipy.special.erf(each)) for each in edges]
     spare = (0.5 * error) ** 2 if coherent else error
     spare -= sum(missing_power(step, count) for step, count in zip(steps, taps, strict=True))
     trims = [0] * taps[1]
@@ -102,12 +104,6 @@ def trims_for(
         spare -= same
         trims[y] = trims[taps[1] - 1 - y] = x + 1
     return tuple(trims) if any(trims) else ()
-
-
-def _tap_shares(step: float, taps: int) -> NDArray[np.float64]:
-    """Each tap's share of ∫exp(−s²Δ²) along one direction, the mean over positions."""
-    edges = step * (np.arange(taps + 1) - 0.5 * taps)
-    return 0.5 * np.diff(scipy.special.erf(edges))
 
 
 def tap_matrix(
@@ -146,11 +142,3 @@ def apply_window(matrices: Sequence[scipy.sparse.csr_array], bins: NDArray[Any])
     """Sum over the bins (ny, nx) with the weights of a matrix along x and one along y."""
     along_y = matrices[1] @ bins
     return (matrices[0] @ np.ascontiguousarray(along_y.T)).T
-
-
-def rows_by_trim(taps: tuple[int, int], trims: Sequence[int]) -> dict[int, list[int]]:
-    """Map from the number of taps skipped at either end of a row to the rows that skip it."""
-    rows: dict[int, list[int]] = {}
-    for row in range(taps[1]):
-        rows.setdefault(trims[row] if trims else 0, []).append(row)
-    return rows

@@ -9,8 +9,8 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.heights.damage import damage
 from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.heights.validity import damage
 from tests.support.directions import rough_patch
 
 NORMAL = gaussian_filter(np.random.default_rng(1).normal(0.0, 0.03, (128, 128)), 3, mode="wrap")

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from mitsuba_diffraction.heights.load import notes_line
 from mitsuba_diffraction.heights.read import LoadOptions
+from mitsuba_diffraction.heights.source import notes_line
 from mitsuba_diffraction.settings import TableSettings
 
 

@@ -26,7 +26,7 @@ def block_grating(
         tau, rho = tau[:, None, None], rho[:, None]
         lam = cells.wavelength_of(k + cells.sine_squared(rho), w, wavelengths, optical)
         light = cells.from_cell(k, kind, channels, tau, rho, lam, optical)
-        scale = blocks.factors(index * light.x, index * light.y, index).scale
+        scale, _ = blocks.factors(index * light.x, index * light.y, index)
         port = np.arange(2 * len(channels))
         order = np.abs(np.subtract.outer(port % len(channels), port % len(channels)))
         values = np.select([order == 0, order == 1], [zeroth, strength], 0.0) * scale

@@ -2,22 +2,20 @@
 
 Contents
 --------
-ideal    gratings with closed-form diffraction
-scales   look-alikes of snake scales
-fingers  positions and shape of a scale's fingers
-noise    periodic random fields
-discs    tracks of CDs and DVDs
-brushed  random lines of brushed and ground metal
-rough    rough mirrors with a K-correlation spectrum
+ideal     gratings with closed-form diffraction
+scales    look-alikes of snake scales
+fingers   positions and shape of a scale's fingers
+noise     periodic random fields
+discs     tracks of CDs and DVDs
+textures  random lines of brushed and ground metal; rough mirrors with a K-correlation spectrum
 """
 
 from __future__ import annotations
 
-from .brushed import brushed
 from .discs import cd, dvd
 from .ideal import blazed, lamellar, sinusoidal
-from .rough import rough
 from .scales import elaphe_like, xenopeltis_like
+from .textures import brushed, rough
 
 __all__ = [
     "blazed",

@@ -194,57 +194,41 @@ def overlay(
     ny, nx = serration.shape
     distance = np.zeros((ny, nx))
     heights = np.full((ny, nx), -blade.floor - blade.floor_slope - blade.pocket)
-    x = np.arange(nx) * (extent[0] / nx)
+    width, dy, columns = extent[0], extent[1] / ny, np.arange(nx)
+    x = columns * (width / nx)
     for row in rows:
-        _lay(heights, distance, row, x, extent, serration, blade)
+        n = row.x.size
+        # three more fingers on both sides: a column that leans may reach across the seam
+        around = np.arange(-3, n + 3)
+        centres = row.x[around % n] + width * (around // n)
+        gaps = (np.roll(row.x, -1) - np.roll(row.x, 1)) % (width if n > 2 else math.inf)
+        density = 2 / gaps if n > 2 else np.full(n, n / width)
+        place = np.interp(x, centres, around.astype(np.float64))
+        # start : about where the tips are
+        density, lean, start = (
+            np.interp(x, centres, values[around % n]) for values in (density, row.lean, row.y)
+        )
+        pitch = 1 / density
+        shear = lean / pitch
+        margin = float(np.abs(row.y - np.roll(row.y, 1)).max()) / 2 + 0.1
+        top = np.floor((start + margin) / dy).astype(np.intp)
+        count = math.ceil((_DRAWN * float(row.length.max()) + margin) / dy)
+        for first in range(0, count, ny):  # a patch shorter than a sheet is covered in turns
+            k = np.arange(first, min(first + ny, count))[:, None]
+            iy = (top - k) % ny
+            y = (top - k) * dy
+            p = place - shear * (start - y)
+            left = np.floor(p).astype(np.intp)
+            f = p - left
+            # values of one finger hold around its axis; half way to the next they change smoothly
+            s = ramp(0.2, 0.8, f)
+            a, b = left % n, (left + 1) % n
+            length, tip, rise = (v[a] + s * (v[b] - v[a]) for v in (row.length, row.y, row.rise))
+            u = np.minimum(f, 1 - f)
+            z, gap = _profile(u, (tip - y) / length, pitch, length, serration[iy, columns], blade)
+            distance[iy, columns] += gap
+            heights[iy, columns] = np.maximum(heights[iy, columns], z + rise)
     return heights, distance
-
-
-def _lay(
-    heights: FloatArray,
-    distance: FloatArray,
-    row: FingerRow,
-    x: FloatArray,
-    extent: Pair,
-    serration: FloatArray,
-    blade: Blade,
-) -> None:
-    """Raise `heights` (ny, nx) to one row's sheet, and add its gaps to `distance`."""
-    ny, nx = heights.shape
-    width, dy = extent[0], extent[1] / ny
-    n = row.x.size
-    # three more fingers on both sides: a column that leans may reach across the seam
-    around = np.arange(-3, n + 3)
-    centres = row.x[around % n] + width * (around // n)
-    gaps = (np.roll(row.x, -1) - np.roll(row.x, 1)) % (width if n > 2 else math.inf)
-    density = 2 / gaps if n > 2 else np.full(n, n / width)
-
-    def along(values: FloatArray) -> FloatArray:
-        return np.interp(x, centres, values[around % n])
-
-    place = np.interp(x, centres, around.astype(np.float64))
-    pitch = 1 / along(density)
-    shear = along(row.lean) / pitch
-    start = along(row.y)  # about where the tips are
-    margin = float(np.abs(row.y - np.roll(row.y, 1)).max()) / 2 + 0.1
-    top = np.floor((start + margin) / dy).astype(np.intp)
-    count = math.ceil((_DRAWN * float(row.length.max()) + margin) / dy)
-    columns = np.arange(nx)
-    for first in range(0, count, ny):  # a patch shorter than a sheet is covered in turns
-        k = np.arange(first, min(first + ny, count))[:, None]
-        iy = (top - k) % ny
-        y = (top - k) * dy
-        p = place - shear * (start - y)
-        left = np.floor(p).astype(np.intp)
-        f = p - left
-        # values of one finger hold around its axis; half way to the next they change smoothly
-        s = ramp(0.2, 0.8, f)
-        a, b = left % n, (left + 1) % n
-        length, tip, rise = (v[a] + s * (v[b] - v[a]) for v in (row.length, row.y, row.rise))
-        u = np.minimum(f, 1 - f)
-        z, gap = _profile(u, (tip - y) / length, pitch, length, serration[iy, columns], blade)
-        distance[iy, columns] += gap
-        heights[iy, columns] = np.maximum(heights[iy, columns], z + rise)
 
 
 def _profile(

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, check_choice
 from ...limits import MOST_PIXELS
 from ...settings import USUAL_WIDTH
 from ..field import HeightField, check_pixel_count
@@ -76,13 +76,10 @@ def blazed(
     height of the ideal tooth, of which (N − 1)/N is sampled.
     """
     n = _samples(pixels_per_period, "blazed")
+    check_choice("blazed: direction", direction, ("descending", "ascending"))
     profile = np.arange(n) / n
     if direction == "descending":
         profile = profile[::-1]
-    elif direction != "ascending":
-        raise DiffractionError(
-            f"blazed: direction: expected 'descending' or 'ascending', got {direction!r}"
-        )
     return _grating("blazed", profile, period, depth, axis, periods, rows)
 
 
@@ -123,8 +120,7 @@ def _grating(
     """Repeat the `profile` (N,) of one period, 0 to 1, along `axis` and scale it to `depth`."""
     length = number_between(period, f"{kind}: period", 1e-3, 1e4, " µm")
     height = number_between(depth, f"{kind}: depth", 0, 1e3, " µm")
-    if axis not in ("x", "y"):
-        raise DiffractionError(f"{kind}: axis: expected 'x' or 'y', got {axis!r}")
+    check_choice(f"{kind}: axis", axis, ("x", "y"))
     pixel = pixel_size_of(length / profile.size, f"{kind}: pixel size (period/pixels_per_period)")
     assert pixel is not None  # a number never means "auto"
     if periods is None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-FloatArray = npt.NDArray[np.float64]
+from ..field import FloatArray as FloatArray
+
 Rng = np.random.Generator
 #: Lengths along x and y, µm.
 Pair = tuple[float, float]
@@ -47,18 +47,6 @@ def sample_field(field: FloatArray, extent: Pair, x: FloatArray, y: FloatArray) 
     my, mx = field.shape
     indices = (y * (my / extent[1]), x * (mx / extent[0]))
     return np.asarray(scipy.ndimage.map_coordinates(field, indices, order=3, mode="grid-wrap"))
-
-
-def on_pixels(field: FloatArray, ny: int, nx: int) -> FloatArray:
-    """Interpolate a periodic `field` (my, mx) on (ny, nx) pixels, by cubic splines."""
-    for axis, count in enumerate((ny, nx)):
-        nodes = field.shape[axis]
-        closed = np.take(field, np.arange(nodes + 1) % nodes, axis)
-        spline = scipy.interpolate.CubicSpline(
-            np.arange(nodes + 1), closed, axis=axis, bc_type="periodic"
-        )
-        field = spline(np.arange(count) * (nodes / count))
-    return field
 
 
 def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> FloatArray:

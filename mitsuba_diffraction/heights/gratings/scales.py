@@ -18,17 +18,7 @@ import scipy
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .fingers import Blade, FingerRow, Layout, lay_out, overlay, ramp
-from .noise import (
-    FloatArray,
-    Pair,
-    Rng,
-    Shape,
-    grain,
-    on_pixels,
-    rounded,
-    sample_field,
-    smooth_field,
-)
+from .noise import FloatArray, Pair, Rng, Shape, grain, rounded, sample_field, smooth_field
 
 # Grid spacing of creases and bends, µm, independent of the pixels.
 _COARSE = 0.3
@@ -224,7 +214,9 @@ def _bent(rng: Rng, extent: Pair, shape: Shape, species: Species) -> FloatArray:
     slope = np.hypot(dx, dy)[1:-1, 1:-1]
     away = fold / np.maximum(slope, 1e-3)  # about the distance from the line fold = 0, µm
     creases = np.maximum(strength, 0) * np.exp(-((away / 0.9) ** 2))
-    return species.bend * on_pixels(bend, *shape) - species.crease * on_pixels(creases, *shape)
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    bent, creased = (sample_field(field, shape[::-1], x, y) for field in (bend, creases))
+    return species.bend * bent - species.crease * creased
 
 
 def stamp(

@@ -3,9 +3,8 @@
 Contents
 --------
 diffraction_orders  `DiffractionOrders`: reflection, and both sides of a sheet or a block's face
-parameters          parameters of the plugin, read from Mitsuba's Properties and checked
-device              a table's look-up inside a kernel
-lobes               light of all orders in a variant's channels, and directions drawn by it
+lobes               a table's look-up inside a kernel, light of all orders in a variant's channels,
+                    and directions drawn by it
 daylight_lobes      the same in RGB variants, summed over daylight
 polarised_lobes     Mueller matrices in polarised variants
 """

@@ -41,7 +41,7 @@ class DaylightLobes:
         self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
 
     def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
-        """See `Lobes.reflected`."""
+        """See `SpectralLobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
         light = Incidence(pair.incident, pair.cos_i)
         total = self._zeroth(light, below, radius, pair)
@@ -53,7 +53,7 @@ class DaylightLobes:
     def draw(
         self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
     ) -> Draw:
-        """See `Lobes.draw`: by a wavelength of daylight."""
+        """See `SpectralLobes.draw`: by a wavelength of daylight."""
         # the place in its bin draws the order, a number of its own the place of the wavelength
         bin_, rest = invert(self._cumulative, mi.UInt32(0), self._bins, self._bins, sample1)
         step = (ENDS[1] - ENDS[0]) / self._bins
@@ -64,7 +64,7 @@ class DaylightLobes:
         return self._window.drawn(row, wavelength, fine - place, sample2)
 
     def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
-        """See `Lobes.albedo`; of the wavelength that is a channel's mean."""
+        """See `SpectralLobes.albedo`; of the wavelength that is a channel's mean."""
         rows = [self.lookup.row(*incident, cos_i, mi.Float(lam)) for lam in RGB_WAVELENGTHS]
         return mi.Color3f(*(self.lookup.total(row) for row in rows))
 

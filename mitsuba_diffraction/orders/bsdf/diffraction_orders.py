@@ -63,13 +63,15 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from ...errors import warn
+from ...errors import DiffractionError, warn
+from ...heights.lengths import is_auto
 from ...optics.geometry import sigma_of
 from ...plugin.base import SurfaceBSDF, asked_sides
 from ...plugin.description import Surface
-from ...plugin.dictionary import ORDERS
+from ...plugin.dictionary import ORDERS, Data
 from ...plugin.directions import Pair, PatchFrame, Site
-from ...plugin.parameters import mono_wavelength, nested_of, orientation_of
+from ...plugin.parameters import mono_wavelength, nested_of, orientation_of, resolved_path
+from ...plugin.properties import class_of
 from ...plugin.sampling import direction_of
 from ...plugin.types import (
     Colour,
@@ -82,11 +84,15 @@ from ...plugin.types import (
     Vector2f,
     Vector3f,
 )
+from ...settings import USUAL_WIDTH, checked
+from ..file import loaded_orders
 from ..table import OrderTable
 from .daylight_lobes import DaylightLobes
-from .lobes import Lobes, OrderLobe, SpectralLobes
-from .parameters import coherence_width_of, table_of
+from .lobes import OrderLobe, SpectralLobes
 from .polarised_lobes import PolarisedLobes
+
+#: Periods that the coherence window spans at least: in a narrower one orders are no lobes.
+LEAST_PERIODS = 2.0
 
 
 class DiffractionOrders(SurfaceBSDF):
@@ -105,9 +111,15 @@ class DiffractionOrders(SurfaceBSDF):
 
     def __init__(self, props: Properties) -> None:
         nested = nested_of(props, ORDERS)
-        self.table = table_of(props, nested)
+        self.table = _table_of(props)
+        if self.table.sides == 2 and nested is not None:
+            kind = "thin sheet" if self.table.thin else "block"
+            raise DiffractionError(
+                f"the table is that of a {kind}, beneath which no BSDF ({class_of(nested)}) lies; "
+                f"put a surface behind the {kind} instead"
+            )
         super().__init__(props, nested)
-        self.coherence_width = coherence_width_of(props, self.table)
+        self.coherence_width = _coherence_width_of(props, self.table)
         self.orientation, self.transmits = orientation_of(props), self.table.sides == 2
         window = OrderLobe(self.table, self.coherence_width)
         self._lobes = _lobes_of(window, mono_wavelength(props, self.table.wavelengths))
@@ -228,7 +240,7 @@ class DiffractionOrders(SurfaceBSDF):
 
 
 class Passage(Pair):
-    """Pair of directions on any sides of a sheet or a face, as `Lobes` take it.
+    """Pair of directions on any sides of a sheet or a face, as lobes take it.
 
     Attributes
     ----------
@@ -258,7 +270,40 @@ def requested(ctx: Context, passed: Mask) -> Mask:
     return dr.select(passed, transmission, reflection)
 
 
-def _lobes_of(window: OrderLobe, wavelength: float) -> Lobes:
+def _table_of(props: Properties) -> OrderTable:
+    """Load the table; raises a DiffractionError with the parameter and the choices."""
+    if ("filename" in props) == ("data" in props):
+        raise DiffractionError(
+            f"{ORDERS} takes one of filename, a file of orders, and data, an "
+            "OrderTable of md.bsdf_dict"
+        )
+    if "data" in props:
+        data = props.get("data")
+        if not isinstance(data, Data) or not isinstance(data.value, OrderTable):
+            raise DiffractionError("data must be an OrderTable; pass it to md.bsdf_dict")
+        return data.value
+    name = props.get("filename")
+    if not isinstance(name, str):
+        raise DiffractionError(f"filename={name!r} must be the name of a file")
+    return loaded_orders(resolved_path(name, "filename"))
+
+
+def _coherence_width_of(props: Properties, table: OrderTable) -> float:
+    """Return the coherence width, µm.
+
+    Raises a DiffractionError with the value and the least one.
+    """
+    value = props.get("coherence_width", "auto")
+    width = USUAL_WIDTH if is_auto(value) else checked("coherence_width", value)
+    if width < LEAST_PERIODS * table.period:
+        raise DiffractionError(
+            f"coherence_width={width:g} µm must be at least {LEAST_PERIODS:g} periods of the "
+            f"grating, {LEAST_PERIODS * table.period:g} µm: narrower windows have no orders"
+        )
+    return float(width)
+
+
+def _lobes_of(window: OrderLobe, wavelength: float) -> SpectralLobes | DaylightLobes:
     """Return the lobes of the current variant."""
     if mi.is_rgb:
         return DaylightLobes(window)

@@ -3,34 +3,41 @@
 With q = k (u, v) of ωi + ωo, f cosθo = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²) cosθo: each
 lobe's integral over directions is its order's efficiency, but for what lies beyond the horizon.
 Order 0 is a mirror's lobe (`optics.mirror`): times C(X_i) C(X_o), it has all of its efficiency.
+Look-ups are those of `lookup`, with the grid on the device.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ...optics.geometry import sigma_of
 from ...optics.orders import lobe_peak, order_lobe
 from ...plugin.arithmetic import maximum, minimum
 from ...plugin.directions import Pair
-from ...plugin.memory import index_between
+from ...plugin.loops import sum_of
+from ...plugin.memory import HalfFloats, index_between, once_a_table, read, upload
 from ...plugin.sampling import BELOW_ONE
 from ...plugin.types import (
     Colour,
     Context,
     Float,
+    Index,
     Interaction,
     Mask,
     Spectrum,
     Vector2f,
 )
+from ..efficiency import lookup_in
+from ..grid import OrderGrid
+from ..lookup import RAISED, Lookup
 from ..table import OrderTable
-from .device import draw, order_lookup
 
 #: Mask of lanes whose ωo lies below a sheet; None without a sheet.
 Below = Mask | None
@@ -47,7 +54,7 @@ class Reflected(NamedTuple):
     Attributes
     ----------
     value : f cosθo.
-    density : of `Lobes.draw`, per solid angle.
+    density : of `SpectralLobes.draw`, per solid angle.
     """
 
     value: Spectrum
@@ -91,24 +98,102 @@ class Draw(NamedTuple):
     valid: Mask
 
 
-class Lobes(Protocol):
-    """Light of all orders in the variant's channels, and directions drawn by it."""
+#: Against division by 0, in single precision.
+_MIN_DIVISOR, _SMALLEST = 1e-7, 2.0**-126
 
-    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
-        """Return value and density of a pair.
 
-        below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
-            sheet.
-        ctx : says whether light comes along ωo (radiance) or along ωi (importance).
-        """
+class Device:
+    """A grid in the current variant's memory; a `lookup.Memory`."""
 
-    def draw(
-        self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
-    ) -> Draw:
-        """Draw a direction for light from ωi, given by its tangential part and cosine."""
+    def __init__(self, grid: OrderGrid) -> None:
+        arrays = {k: v for k, v in grid._asdict().items() if isinstance(v, np.ndarray)}
+        self._starts = {k: upload(mi.UInt32, v) for k, v in arrays.items() if v.ndim == 1}
+        # corners hold a record of 8 for each of their parts
+        shapes = {k: v.reshape(-1, 8) if k == "corners" else v for k, v in arrays.items()}
+        self._records = {k: HalfFloats(v) for k, v in shapes.items() if v.ndim == 2}
+        self.scale = self._records["corners"].scale
 
-    def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
-        """Return the sum of the orders' efficiencies, of all sides."""
+    def read(self, name: str, index: Index, numbers: int, active: Mask) -> Sequence[Float]:
+        """See `Memory.read`."""
+        packets = self._records[name].read(index, active)
+        return [mi.Float(x) for packet in packets for x in packet][:numbers]
+
+    def start(self, name: str, kind: Index) -> Index:
+        """See `Memory.start`."""
+        return read(mi.UInt32, self._starts[name], kind)
+
+    @staticmethod
+    def sum(count: Index, add: Callable[..., Float], inputs: Any, zero: Float) -> Float:
+        """See `Memory.sum`."""
+        return sum_of(count, add, inputs, mi.Float(0.0))
+
+
+@once_a_table
+def order_lookup(table: OrderTable) -> Lookup:
+    """Return the look-up of a table in the current variant."""
+    elements = mi.is_polarized and table.polarised
+    return lookup_in(table, Device, coated=True, elements=elements, chances=True)
+
+
+def draw(lookup: Lookup, row: Any, sample: Float) -> tuple[Any, Mask, Mask]:
+    """Draw an order by its efficiency over `Lookup.total`.
+
+    Returns the order, whether it leaves on the second side, and whether there is any.
+    """
+    if lookup.has_chances:
+        return _drawn_at_a_corner(lookup, row, sample)
+    target, ports = sample * lookup.total(row), mi.UInt32(lookup.ports(row))
+
+    def body(port: Index, reached: Float) -> tuple[Index, Float]:
+        order, below = lookup.order_at(row, port)
+        share = lookup.share(row, order, True, below if lookup.sides == 2 else None)
+        return port + 1, reached + share.chance
+
+    def further(port: Index, reached: Float) -> Mask:
+        return (reached <= target) & (port < ports)
+
+    port, reached = dr.while_loop((mi.UInt32(0), mi.Float(0.0)), further, body)
+    # of listed light, the last port's order may not propagate: no light
+    return *lookup.order_at(row, dr.select(port > 0, port - 1, 0)), reached > target
+
+
+def _drawn_at_a_corner(lookup: Lookup, row: Any, sample: Float) -> tuple[Any, Mask, Mask]:
+    """Draw a corner of a cell by its part of the sum, then an order by the chances at that node.
+
+    Interpolation mixes the corners, so that both draws have the interpolated chances; and the
+    orders of a node lie side by side in memory.
+    """
+    target, mirrored = sample * lookup.total(row), mi.Mask(False)
+    if lookup.coated:  # the face's mirror direction comes first
+        mirrored = target < row.face * RAISED
+        target = (target - row.face * RAISED) * dr.rcp(dr.maximum(row.entering, _MIN_DIVISOR))
+    node, rest, found, before = mi.UInt32(0), mi.Float(0.0), mi.Mask(False), mi.Float(0.0)
+    corners = zip(lookup.nodes(row), row.weights, lookup.totals(row), strict=True)
+    for corner, weight, total in corners:
+        raised = weight * RAISED
+        after = dr.fma(raised, total, before)
+        here = (target >= before) & (target < after)
+        node = dr.select(here, corner, node)
+        rest = dr.select(here, (target - before) * dr.rcp(dr.maximum(raised, _SMALLEST)), rest)
+        found, before = found | here, after
+    ports = mi.UInt32(lookup.ports(row))
+    records = (ports + 7) >> 3
+    first = lookup.memory.start("chance_starts", row.kind) + (node * ports + row.entered) * records
+
+    def body(n: Index, port: Index, reached: Float) -> tuple[Index, Index, Float]:
+        for i, chance in enumerate(lookup.memory.read("chances", first + n, 8, row.lit)):
+            port = dr.select(reached <= rest, n * 8 + i, port)
+            reached = reached + chance
+        return n + 1, port, reached
+
+    def further(n: Index, port: Index, reached: Float) -> Mask:
+        return (reached <= rest) & (n < records)
+
+    state = mi.UInt32(0), mi.UInt32(0), mi.Float(0.0)
+    _, port, reached = dr.while_loop(state, further, body)
+    order, below = lookup.order_at(row, port)
+    valid = found & (reached > rest)
+    return dr.select(mirrored, 0.0, order), mi.Mask(below) & ~mirrored, valid | mirrored
 
 
 class OrderLobe:
@@ -176,11 +261,10 @@ class OrderLobe:
 
     def drawn(self, row: Any, wavelength: Float, sample1: Float, sample2: Vector2f) -> Draw:
         """Draw an order of a row, and a direction in its lobe."""
-        drawn = draw(self.lookup, row, sample1)
+        order, below, valid = draw(self.lookup, row, sample1)
         wide = wavelength * (1e-3 / (2.0 * math.pi * math.sqrt(2.0) * self.sigma))
         spread = mi.warp.square_to_std_normal(minimum(sample2, BELOW_ONE)) * wide
-        centre = self.centre(drawn.order, wavelength)
-        return Draw(centre + mi.Vector2f(spread), drawn.below, drawn.valid)
+        return Draw(self.centre(order, wavelength) + mi.Vector2f(spread), below, valid)
 
 
 def wavenumber_of(wavelength: Float) -> Float:
@@ -197,7 +281,10 @@ def nearest(position: Float, overlap: bool) -> list[Float]:
 
 
 class SpectralLobes:
-    """Spectral variants, whose rays carry wavelengths, and mono variants, which have one for all.
+    """Light of all orders in the variant's channels, and directions drawn by it.
+
+    Of spectral variants, whose rays carry wavelengths, and of mono variants, which have one for
+    all. `DaylightLobes` has the same methods for RGB variants.
 
     wavelength : nm, of mono variants.
     """
@@ -208,7 +295,12 @@ class SpectralLobes:
         dr.make_opaque(self._fixed)
 
     def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
-        """See `Lobes.reflected`; the density is the mean over wavelengths."""
+        """Return value and density of a pair; the density is the mean over wavelengths.
+
+        below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
+            sheet.
+        ctx : says whether light comes along ωo (radiance) or along ωi (importance).
+        """
         lit: list[Lit] = []
         density = mi.Float(0.0)
         wavelengths = self._wavelengths(si)
@@ -239,7 +331,10 @@ class SpectralLobes:
     def draw(
         self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
     ) -> Draw:
-        """See `Lobes.draw`: by one of the wavelengths, chosen with equal probability."""
+        """Draw a direction for light from ωi, given by its tangential part and cosine.
+
+        One of the wavelengths is chosen with equal probability.
+        """
         wavelengths = self._wavelengths(si)
         count = float(len(wavelengths))
         number = index_between(dr.floor(sample1 * count), 0.0, count - 1.0)
@@ -250,7 +345,7 @@ class SpectralLobes:
         return self._window.drawn(row, wavelength, sample1 * count - number, sample2)
 
     def albedo(self, incident: Vector2f, cos_i: Float, si: Interaction) -> Colour:
-        """See `Lobes.albedo`."""
+        """Return the sum of the orders' efficiencies, of all sides."""
         rows = [self.lookup.row(*incident, cos_i, lam) for lam in self._wavelengths(si)]
         return mi.UnpolarizedSpectrum([self.lookup.total(row) for row in rows])
 

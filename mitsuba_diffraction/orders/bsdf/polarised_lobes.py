@@ -10,8 +10,6 @@ to the grating is taken to be depolarised.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import drjit as dr
 import mitsuba as mi
 
@@ -21,35 +19,11 @@ from ...optics.fresnel import amplitudes
 from ...plugin.arithmetic import maximum, minimum
 from ...plugin.boundary import mueller, turn, turned
 from ...plugin.directions import Pair
-from ...plugin.types import Context, Float, Mask, Spectrum, Vector3f
-from ..lookup import Lookup
+from ...plugin.types import Context, Float, Spectrum, Vector3f
 from ..polarised import nearest_jones
 from .lobes import Lit, SpectralLobes
 
 _MIN_DIVISOR, _MIN_POWER = 1e-12, 1e-30
-
-
-class Wave(NamedTuple):
-    """Polarised light of an order.
-
-    Attributes
-    ----------
-    jones : with ½ Σ|J|² = 1.
-    share : of the order's light, that came from the grating once; the rest is depolarised.
-    """
-
-    jones: Jones
-    share: Float
-
-
-def _wave(lookup: Lookup, row: Any, order: Any, y: Float, active: Mask) -> Wave:
-    """Return the light of an order; y : direction cosine of the light along the grooves."""
-    elements = lookup.elements(row, order, y, active)
-    share = mi.Float(1.0)
-    if lookup.coated:
-        within = lookup.repeated(row, order, active & row.lit)
-        share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
-    return Wave(nearest_jones(elements), share)
 
 
 class PolarisedLobes(SpectralLobes):
@@ -65,16 +39,19 @@ class PolarisedLobes(SpectralLobes):
             jones = []
             for n, light in enumerate(lit):
                 order, lobe, efficiency = light.terms[number]
-                wave = _wave(self.lookup, light.row, order, y, lobe > 0.0)
+                elements = self.lookup.elements(light.row, order, y, active := lobe > 0.0)
                 lobe = lobe * light.peak
-                face = mi.Float(0.0)
+                # share that came from the grating once; the rest is depolarised
+                face, share = mi.Float(0.0), mi.Float(1.0)
                 if self.lookup.coated:
+                    within = self.lookup.repeated(light.row, order, active & light.row.lit)
+                    share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
                     face = dr.select(order == 0.0, light.row.face, 0.0)
-                power = maximum(efficiency - face, 0.0) * lobe * wave.share
+                power = maximum(efficiency - face, 0.0) * lobe * share
                 faces[n] = dr.fma(face, lobe, faces[n])
                 left[n] -= power
                 root = dr.sqrt(maximum(power, _MIN_POWER))  # has a derivative
-                jones.append(tuple(entry * root for entry in wave.jones))
+                jones.append(tuple(entry * root for entry in nearest_jones(elements)))
             total += path.diffracted(jones)
         if self.lookup.coated:
             rest = [maximum(a - b, 0.0) for a, b in zip(left, faces, strict=True)]

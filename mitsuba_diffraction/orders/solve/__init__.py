@@ -8,10 +8,8 @@ crossed     solver: coupled waves of crossed gratings
 settings    settings of a solution, and estimates of its stages
 accuracy    error of a table, measured at random directions and wavelengths
 profiles    one period of the grooves as a polygon; generators and a reader
-grating_index  refractive index over wavelength, by name or number
-dispersion  indices of files: refractiveindex.info, Zemax's glasses
-structure   films on a profile, slices beneath it, and the substrate
-films       their reader and checks
+grating_index  refractive index over wavelength, by name or number, or of a file
+films       films on a profile, slices beneath it, and the substrate; their reader and checks
 stations    sets of directions with one system matrix
 integral    solver: boundary integral method
 chandezon   solver: coordinates that follow slopes

@@ -31,9 +31,9 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, toeplitz
 
 from ...errors import DiffractionError
+from .films import Structure
 from .profiles import Profile
 from .stations import Real, Station
-from .structure import Structure
 
 Complex = NDArray[Any]
 

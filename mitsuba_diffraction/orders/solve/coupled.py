@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, toeplitz
 
 from ...errors import DiffractionError
+from .films import Slice, Structure
 from .profiles import Profile
 from .stations import LEAST_NORMAL, Real, Station
-from .structure import Slice, Structure
 
 Complex = NDArray[Any]
 

@@ -7,7 +7,7 @@ light as a file's efficiencies do.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -27,7 +27,6 @@ from .nodes import AnyPlace, located
 from .resolution import resolved
 from .settings import (
     MOST_EXCESS,
-    Estimate,
     Settings,
     announce_comparison,
     announce_stage,
@@ -52,9 +51,8 @@ class Directions(NamedTuple):
 
 
 def solve_directions(
-    problem: Problem, lights: Directions, how: Settings, work: Jobs,
-    announce: Callable[[Estimate], None], facts: Mapping[str, Any],
-) -> OrderTable:  # fmt: skip
+    problem: Problem, lights: Directions, how: Settings, work: Jobs, facts: Mapping[str, Any]
+) -> OrderTable:
     """Solve the orders of light from some directions, on all sides of the grating.
 
     Raises a DiffractionError if the directions are out of their range, too many lights are asked
@@ -99,7 +97,7 @@ def solve_directions(
     for came, of_side in enumerate(found):
         for light in of_side:
             ports[light.place].append(came * len(light.orders) + light.port)
-    announce_comparison(announce, problem, work, compared)
+    announce_comparison(problem, work, compared)
     chosen = resolved(problem, work, compared, how.tolerance / 2, ports)
     ends = np.concatenate([light.orders for of_side in found for light in of_side])
     first, last = ends.min(axis=0), ends.max(axis=0)
@@ -111,7 +109,7 @@ def solve_directions(
         elements = 1  # without phases, which tell s from p
     values = np.full((len(waves), grating.sides, grating.sides, len(orders), elements), np.nan)
     jones = np.full((*values.shape[:-1], 4), np.nan, np.complex128) if how.polarised else None
-    announce_stage(announce, "solving", chosen.problem, work, every, 4.0 * values.size)
+    announce_stage("solving", chosen.problem, work, every, 4.0 * values.size)
     solved = work.amplitudes(chosen.problem, every, "solving orders")
     for came, of_side in enumerate(found):
         for n, light in enumerate(of_side):
@@ -135,19 +133,16 @@ def solve_directions(
         table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
     )  # fmt: skip
     if lights.is_all:
+        # index of a clear material in the middle of its wavelengths
+        middle = grating.material.index(0.5 * sum(grating.wavelengths))
         assert isinstance(made.response, ListedResponse)
-        made = replace(made, response=replace(made.response, index=_clear_index(grating)))
+        assert middle is not None  # `crossed.check_cell`
+        clear = None if middle.imag or middle.real <= 1.0 else float(middle.real)
+        made = replace(made, response=replace(made.response, index=clear))
         header |= measured_error(made, chosen.problem, work).facts()
         warn_of_error(header)
     warn_of_gaps(made, table, f"the table of {grating.profile.name}")
     return replace(made, header=header | {"processor_seconds": round(work.processor_seconds, 1)})
-
-
-def _clear_index(grating: Grating) -> float | None:
-    """Return the index of a grating's material in the middle of its wavelengths; None of metals."""
-    index = grating.material.index(0.5 * sum(grating.wavelengths))
-    assert index is not None  # `crossed.check_cell`
-    return None if index.imag or index.real <= 1.0 else float(index.real)
 
 
 def _nearest_grazing(grating: Grating, x: Real, y: Real, waves: Real) -> int:

@@ -1,10 +1,11 @@
-"""Films on a profile, and layers and slices beneath it: read, checked, and named."""
+"""Media around a profile: films on it, slices beneath it, and the substrate below them."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 from ...errors import DiffractionError, check_keys, quoted
 from ...files import read_toml
@@ -12,13 +13,74 @@ from ...heights.lengths import count_between, number_between
 from ...limits import MOST_LAYERS, check_count
 from .grating_index import TabulatedIndex, material_of
 from .profiles import Profile
-from .stations import Grating
-from .structure import Part, ProfileFilm, Slice, Structure
 
 Substance = str | float | complex | TabulatedIndex
 #: Layers, from the material upwards: material and thickness in µm. Slices, beneath a profile, are a
 #: thickness and parts, of a material and the x in µm at which it begins and ends.
 Layers = Sequence[tuple[Any, ...]]
+
+
+class ProfileFilm(NamedTuple):
+    """Film on a profile, as thick along z everywhere; thickness in µm."""
+
+    material: TabulatedIndex
+    thickness: float
+
+
+class Part(NamedTuple):
+    """Rectangle of a slice, from x = begin to end in µm; end may lie in the next period."""
+
+    material: TabulatedIndex
+    begin: float
+    end: float
+
+
+class Slice(NamedTuple):
+    """Slab with vertical walls, thickness in µm; the medium above the grating fills its gaps."""
+
+    thickness: float
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """All media of a grating but the profile's material and the medium above.
+
+    Attributes
+    ----------
+    films : on the profile, from its material upwards.
+    slices : beneath the lowest point of the profile, from the substrate upwards.
+    substrate : below the slices; None is the profile's material.
+    """
+
+    films: tuple[ProfileFilm, ...] = ()
+    slices: tuple[Slice, ...] = ()
+    substrate: TabulatedIndex | None = None
+
+    def __bool__(self) -> bool:
+        """Whether any medium is added."""
+        return bool(self.films or self.slices or self.substrate)
+
+    @property
+    def is_beneath(self) -> bool:
+        """Whether media lie beneath the profile's material."""
+        return bool(self.slices or self.substrate)
+
+    @property
+    def materials(self) -> tuple[TabulatedIndex, ...]:
+        """Materials of the films, of the slices' parts, and of the substrate, in this order."""
+        parts = (part.material for layer in self.slices for part in layer.parts)
+        substrate = () if self.substrate is None else (self.substrate,)
+        return (*(film.material for film in self.films), *parts, *substrate)
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """All lengths, µm, which with the materials identify the structure."""
+        lengths: list[float] = [len(self.films), *(film.thickness for film in self.films)]
+        for thickness, parts in self.slices:
+            lengths += [thickness, len(parts)]
+            lengths += [end for part in parts for end in (part.begin, part.end)]
+        return tuple(lengths)
 
 
 def structure_of(
@@ -93,22 +155,6 @@ def checked_layers(value: Any, shown: str) -> Layers:
             f"{quoted(value)}"
         )
     return tuple(tuple(layer) for layer in value)
-
-
-def material_text(grating: Grating) -> str:
-    """Return the materials of a grating from the top, for people."""
-    structure = grating.structure
-    films = [f"{film.material.name} {film.thickness:g} µm" for film in reversed(structure.films)]
-    lower = [
-        f"{' and '.join(dict.fromkeys(part.material.name for part in layer.parts)) or 'gap'} "
-        f"{layer.thickness:g} µm"
-        for layer in reversed(structure.slices)
-    ]
-    if len(lower) > 4:
-        lower = [*lower[:2], f"{len(lower) - 3} layers", lower[-1]]
-    own = [grating.material.name] if grating.profile.depth or not structure.slices else []
-    lowest = structure.substrate or (grating.material if structure.slices else None)
-    return " on ".join([*films, *own, *lower, *([lowest.name] if lowest else [])])
 
 
 def _film(layer: Sequence[Any], where: str, wavelengths: tuple[float, float]) -> ProfileFilm:

@@ -87,14 +87,12 @@ class IntegralSolver:
             warnings.simplefilter("ignore", RuntimeWarning)
             if station.indices is None:
                 return self._perfect(waves)[None]
-            above = self._operators(waves.k, waves.reference)
+            # single layer V and ½ + K (corners subtracted) of the medium above
+            double = self._matrix("double_layer", waves.k, waves.reference, subtract_corners=True)
+            single = self._matrix("single_layer", waves.k, waves.reference)
+            above = single, double + 0.5 * np.eye(self.points)
             pairs = zip(station.wavelengths, station.indices, station.along, strict=True)
             return np.stack([self._finite(waves, above, *pair) for pair in pairs])
-
-    def _operators(self, k: complex, alpha: float) -> tuple[Complex, Complex]:
-        """Single layer V and ½ + K (corners subtracted) of the medium above."""
-        double = self._matrix("double_layer", k, alpha, subtract_corners=True)
-        return self._matrix("single_layer", k, alpha), double + 0.5 * np.eye(self.points)
 
     def _finite(
         self,

@@ -28,7 +28,7 @@ from .crossed import CrossedWaves
 from .integral import IntegralSolver
 from .nodes import AnyPlace, CrossedPlace
 from .sheet import sheet_efficiencies
-from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, Station, on_both_sides
+from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, on_both_sides
 
 Spot = TypeVar("Spot", bound=AnyPlace)
 
@@ -177,7 +177,12 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
             place.band, place.kind, place.tau, place.rho, w, problem.least_cosine
         )
         if problem.method in LAYERED:
-            _check_harmonics(problem, station)
+            numbers = np.append(station.inside, [0, station.channels - 1]) - station.channels // 2
+            if (needed := int(np.abs(numbers).max())) > problem.resolution:
+                raise DiffractionError(
+                    f"{grating.profile.name} at resolution {problem.resolution}: more orders "
+                    f"propagate; use a resolution of at least {needed}, or leave it out"
+                )
     try:
         values = solver.amplitudes(station)
     except DiffractionError:
@@ -195,17 +200,6 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     return Solved(values.astype(np.complex64), time.thread_time() - start)
 
 
-def _check_harmonics(problem: Problem, station: Station) -> None:
-    """Refuse a resolution whose harmonics are fewer than the orders that propagate."""
-    middle = station.channels // 2
-    numbers = np.append(station.inside, [0, station.channels - 1]) - middle
-    if (needed := int(np.abs(numbers).max())) > problem.resolution:
-        raise DiffractionError(
-            f"{problem.grating.profile.name} at resolution {problem.resolution}: more orders "
-            f"propagate; use a resolution of at least {needed}, or leave it out"
-        )
-
-
 @dataclass
 class Jobs:
     """Where stations are solved, and kept: none is solved twice.
@@ -216,11 +210,13 @@ class Jobs:
         alone.
     executor : processes or a cluster; None solves here.
     progress : called as progress(done, total, text).
+    announce : called with the `settings.Estimate` of each stage before it starts; None for none.
     """
 
     folder: Path | None = None
     executor: Executor | None = None
     progress: Progress = silent
+    announce: Callable[[Any], None] | None = None
     _known: dict[str, Solved] = field(default_factory=dict, init=False)
 
     def solve(self, problem: Problem, places: Sequence[Spot], text: str) -> dict[Spot, Real]:

@@ -14,10 +14,11 @@ from ...errors import DiffractionError
 from .. import cells
 from ..cells import Counts
 from ..polarised import ODD, mueller_of
-from .accuracy import diffuse_light, powers
+from ..response import MUELLER, UNPOLARISED
+from .accuracy import diffuse_light
 from .jobs import Jobs, Problem
 from .nodes import MAX_NODES, MIN_NODES, Line, Place, count_for, lines
-from .settings import Estimate, Settings, announce_stage
+from .settings import Settings, announce_stage
 from .stations import Complex, Grating, Real, reversed_light
 
 #: Expected error over the tolerance from which on a solution is refused: lines across bands
@@ -32,7 +33,6 @@ def node_counts(
     jobs: Jobs,
     bands: Iterable[int],
     how: Settings,
-    announce: Callable[[Estimate], None],
 ) -> dict[int, Counts]:
     """Choose the numbers of nodes of each band by series along lines across it.
 
@@ -41,13 +41,19 @@ def node_counts(
     most = Counts(*MAX_NODES[:2], 1 if problem.grating.is_perfect else MAX_NODES[2])
     drawn = {band: list(lines(band, most)) for band in bands}
     places = [place for of_band in drawn.values() for line in of_band for place in line.places]
-    announce_stage(announce, "choosing nodes", problem, jobs, places)
+    announce_stage("choosing nodes", problem, jobs, places)
     solved = jobs.amplitudes(problem, places, "choosing nodes")
-    values_of = functools.partial(_elements, problem.grating) if how.polarised else _unpolarised
+    count = MUELLER if how.polarised else UNPOLARISED
+    values_of = functools.partial(_elements, problem.grating, count)
     # three variables share the tolerance; rarely seen bands may miss more. Polarisation changes in
     # more places than two crossings show
     tolerance = (_OF_POLARISED if how.polarised else 1.0) * how.tolerance
-    shares, sides = _band_shares(problem.grating, len(drawn)), problem.grating.sides
+    grating, sides = problem.grating, problem.grating.sides
+    # Share of diffuse white light in each band, at least 1/(16 bands). If a band of share p misses
+    # 1/√(n p) of a tolerance, all n bands together miss the tolerance at most (Cauchy and Schwarz)
+    band = cells.to_cell(*diffuse_light(4096, grating.wavelengths), grating.optical_period).band
+    counted = np.bincount(np.minimum(band, len(drawn) - 1), minlength=len(drawn)) / len(band)
+    shares = np.maximum(counted, 1.0 / (16 * len(drawn)))
     chosen = {
         band: _count(
             of_band, most, solved, values_of, tolerance / np.sqrt(3 * len(drawn) * share), sides
@@ -66,18 +72,6 @@ def node_counts(
             "wavelengths"
         )
     return counts
-
-
-def _band_shares(grating: Grating, bands: int) -> Real:
-    """Return the share of diffuse white light in each band, at least 1/(16 bands).
-
-    If a band of share p misses 1/√(n p) of a tolerance, all n bands together miss the tolerance at
-    most (Cauchy and Schwarz).
-    """
-    x, y, lam = diffuse_light(4096, grating.wavelengths)
-    band = cells.to_cell(x, y, lam, grating.optical_period).band
-    counted = np.bincount(np.minimum(band, bands - 1), minlength=bands) / len(band)
-    return np.maximum(counted, 1.0 / (16 * bands))
 
 
 def _count(
@@ -113,13 +107,11 @@ def _count(
     return Counts(*needed), float(np.linalg.norm(missed))
 
 
-def _unpolarised(place: Place, amplitudes: Complex) -> Real:
-    """Return unpolarised efficiencies (w, j, q, 1)."""
-    return powers(amplitudes).mean(axis=-1, keepdims=True)
+def _elements(grating: Grating, count: int, place: Place, amplitudes: Complex) -> Real:
+    """Return the first elements of ½ M (w, j, q, count), odd ones over y.
 
-
-def _elements(grating: Grating, place: Place, amplitudes: Complex) -> Real:
-    """Return ½ M (w, j, q, 16), whose norm is the efficiency, with odd elements over y."""
+    Of all 16 the norm is the efficiency.
+    """
     y = grating.station(*place).along[:, None, None, None, None]
     elements = 0.5 * mueller_of(amplitudes) * np.where(ODD, 1.0 / y, 1.0)
-    return elements.reshape(*elements.shape[:3], 16)
+    return elements.reshape(*elements.shape[:3], MUELLER)[..., :count]

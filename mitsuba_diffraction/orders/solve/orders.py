@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from .. import cells
 from ..cells import Counts
 from ..polarised import mueller_of
 from ..response import ALONG, MOST_NODES, MUELLER, UNPOLARISED, Band, CellResponse
-from ..table import OrderTable, check_outline
+from ..table import LEAST_BLOCK, OrderTable, check_outline
 from .accuracy import WORST, measured_error, missed_tolerance, powers, warn_of_error
 from .crossed import PHI, THETA, check_cell
 from .directions import Directions, solve_directions
@@ -39,8 +40,7 @@ from .resolution import (
     reciprocity_error,
     resolved,
 )
-from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of, silent
-from .sheet import check_clear
+from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of
 from .stations import Complex, Grating, Real
 
 #: Times that a table which misses its tolerance gets more nodes, and their factor.
@@ -109,7 +109,9 @@ def solve_orders(
             "solve_orders: expected a profile, as of md.profiles.lamellar, or a HeightField, got "
             f"{quoted(profile)}; a recipe is solved by the command 'solve'"
         )
-    how, work, tell = settings or Settings(), jobs or Jobs(), announce or silent
+    how, work = settings or Settings(), jobs or Jobs()
+    if announce is not None:
+        work.announce = announce
     substance = material_of(material, how.wavelengths)
     if isinstance(profile, HeightField):
         if thin or block or layers or beneath or substrate is not None or superstrate != 1.0:
@@ -124,9 +126,14 @@ def solve_orders(
         )
         every = Directions(THETA, PHI, step or 20.0, is_all=True)
         lights = every if theta is None else Directions(theta, phi, step or 5.0)
-        return solve_directions(problem, lights, how, work, tell, {})
+        return solve_directions(problem, lights, how, work, {})
     if thin or block:
-        check_clear(substance, how.wavelengths)
+        index = substance.index(how.wavelengths)
+        if index is None or index.imag.any() or index.real.min() < LEAST_BLOCK:
+            raise DiffractionError(
+                f"material {substance.name}: light goes through a clear material only; "
+                f"give its index, a real number of {LEAST_BLOCK:g} to 100, such as 1.58"
+            )
         if how.polarised:
             raise DiffractionError(
                 "polarised: tables of sheets and blocks have efficiencies alone; leave it out"
@@ -136,7 +143,15 @@ def solve_orders(
             raise DiffractionError(
                 "block: a block has no layers, superstrate or second face; leave these out"
             )
-        grating = _block(profile, substance, how)
+        # The grating of a block's face is upside down, with the block above: the block has more
+        # channels, and light of the rarer medium has some of them (`blocks`). Coupled waves solve
+        # both at once; they conserve the energy of clear materials to rounding
+        check_choice("method", how.method, (AUTO, "coupled"))
+        assert index is not None
+        inner = float(index[0].real)
+        check_outline((profile.period, math.inf), how.wavelengths, block=inner, listed=True)
+        turned, above = replace(profile, z=-profile.z), material_of(1.0, how.wavelengths)
+        grating = Grating(turned, above, inner, how.wavelengths, block=True)
     else:
         structure = structure_of(
             profile, substance, how.wavelengths,
@@ -147,24 +162,9 @@ def solve_orders(
     facts = {"material": substance.name} if block else {}
     if theta is not None:
         lights = Directions(theta, phi, step or 5.0)
-        return solve_directions(problem, lights, how, work, tell, facts)
+        return solve_directions(problem, lights, how, work, facts)
     check_outline((profile.period, math.inf), how.wavelengths, *_media(grating))
-    return _solve_cells(problem, how, work, tell, facts)
-
-
-def _block(profile: Profile, substance: TabulatedIndex, how: Settings) -> Grating:
-    """Return the grating of a block's face: upside down, with the block above.
-
-    The block has more channels, and light of the rarer medium has some of them (`blocks`). Coupled
-    waves solve both at once; they conserve the energy of clear materials to rounding.
-    """
-    check_choice("method", how.method, (AUTO, "coupled"))
-    known = substance.index(np.asarray(how.wavelengths))
-    assert known is not None
-    index = float(known[0].real)
-    check_outline((profile.period, math.inf), how.wavelengths, block=index, listed=True)
-    turned = Profile(profile.x, -profile.z, profile.period, profile.name)
-    return Grating(turned, material_of(1.0, how.wavelengths), index, how.wavelengths, block=True)
+    return _solve_cells(problem, how, work, facts)
 
 
 def _media(grating: Grating) -> tuple[float, bool, float | None]:
@@ -175,9 +175,8 @@ def _media(grating: Grating) -> tuple[float, bool, float | None]:
 
 
 def _solve_cells(
-    problem: Problem, how: Settings, work: Jobs, tell: Callable[[Estimate], None],
-    facts: Mapping[str, Any],
-) -> OrderTable:  # fmt: skip
+    problem: Problem, how: Settings, work: Jobs, facts: Mapping[str, Any]
+) -> OrderTable:
     """Solve all directions and wavelengths."""
     grating = problem.grating
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
@@ -188,22 +187,34 @@ def _solve_cells(
     if grating.block:
         counts = dict.fromkeys(bands, BLOCK_COUNTS)
     else:
-        counts = node_counts(coarse, work, bands, how, tell)
+        counts = node_counts(coarse, work, bands, how)
     header = header_of(chosen, how) | dict(facts)
     superstrate, thin, block = _media(grating)
     elements = MUELLER if how.polarised else UNPOLARISED if block else ALONG
+    values_of = _lossless if grating.block else partial(_limited, elements)
+    # light that is its own reverse, see `resolution`
+    itself = [Place(k, kind, 0.5, 0.41, (0.5,)) for k in bands for kind in kinds_of(k)]
     for refinement in range(REFINEMENTS + 1):
-        problem, solved = _solved_at_nodes(problem, counts, work, tell, elements)
+        problem, solved = _solved_at_nodes(problem, counts, work, elements)
         header |= {
             "solver": solver_of(problem).name,
-            "reciprocity_error": _reciprocity(problem, work, bands),
+            "reciprocity_error": reciprocity_error(
+                work.solve(problem, itself, "checking reciprocity"), grating.sides
+            ),
         }
         if thin:
             header["energy_error"] = energy_error(np.abs(values) ** 2 for values in solved.values())
-        made = tuple(_band(grating, k, counts[k], solved, how.polarised) for k in bands)
+        made = []
+        for k in bands:
+            places = places_of(k, counts[k], _nodes(grating))
+            of_kinds = (
+                at_nodes(kind, places, counts[k], solved, grating.sides, values_of)
+                for kind in kinds_of(k)
+            )
+            made.append(Band(k, *of_kinds))
         table = OrderTable(
             grating.periods, how.wavelengths,
-            CellResponse(made, even=bool(block)), superstrate, header, thin, block,
+            CellResponse(tuple(made), even=bool(block)), superstrate, header, thin, block,
         )  # fmt: skip
         error = measured_error(table, problem, work)
         header |= error.facts()
@@ -220,18 +231,14 @@ def _solve_cells(
 
 
 def _solved_at_nodes(
-    problem: Problem,
-    counts: Mapping[int, Counts],
-    jobs: Jobs,
-    announce: Callable[[Estimate], None],
-    elements: int,
+    problem: Problem, counts: Mapping[int, Counts], jobs: Jobs, elements: int
 ) -> tuple[Problem, dict[Place, Complex]]:
     """Solve all nodes, at a higher resolution if solutions have light from nothing."""
     along = _nodes(problem.grating)
     places = [place for band in counts for place in places_of(band, counts[band], along)]
     size = _size(problem.grating, counts, elements)
     for _ in range(_RAISED):
-        announce_stage(announce, "solving", problem, jobs, places, size)
+        announce_stage("solving", problem, jobs, places, size)
         solved = jobs.amplitudes(problem, places, "solving orders")
         excess = max(float(powers(values).sum(axis=2).max()) for values in solved.values())
         if excess <= MOST_EXCESS:
@@ -278,30 +285,6 @@ def _refined_counts(
     }
 
 
-def _band(
-    grating: Grating, band: int, counts: Counts, solved: Mapping[Place, Complex], polarised: bool
-) -> Band:
-    """Assemble the response of a band from its stations."""
-    places = places_of(band, counts, _nodes(grating))
-    values_of = _limited_mueller if polarised else _along_grooves
-    if grating.block:
-        values_of = _lossless
-    return Band(
-        band,
-        *(
-            at_nodes(kind, places, counts, solved, grating.sides, values_of)
-            for kind in kinds_of(band)
-        ),
-    )
-
-
-def _along_grooves(amplitudes: Complex) -> Real:
-    """Return M₀₀ and M₀₁ (w, j, q, 2) of amplitudes, scaled where powers sum to more than 1."""
-    along = powers(amplitudes)
-    along_e, along_b = np.moveaxis(along / np.maximum(along.sum(axis=2, keepdims=True), 1.0), -1, 0)
-    return np.stack([0.5 * (along_e + along_b), 0.5 * (along_e - along_b)], axis=-1)
-
-
 def _lossless(amplitudes: Complex) -> Real:
     """Return M₀₀ (w, j, q, 1), of which the mirror's order has the remainder of each port."""
     values = powers(amplitudes).mean(axis=-1)
@@ -314,15 +297,11 @@ def _lossless(amplitudes: Complex) -> Real:
     return others[..., None]
 
 
-def _limited_mueller(amplitudes: Complex) -> Real:
-    """Return the Mueller matrices of amplitudes, scaled where their powers sum to more than 1."""
+def _limited(count: int, amplitudes: Complex) -> Real:
+    """Return the first elements of the Mueller matrices of amplitudes, (w, j, q, count).
+
+    Amplitudes are scaled where their powers sum to more than 1.
+    """
     total = powers(amplitudes).sum(axis=2)
     matrices = mueller_of(amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None])
-    return matrices.reshape(*matrices.shape[:-2], 16)
-
-
-def _reciprocity(problem: Problem, jobs: Jobs, bands: Iterable[int]) -> float:
-    """Return the largest violation of reciprocity in any band; see `resolution`."""
-    places = [Place(band, kind, 0.5, 0.41, (0.5,)) for band in bands for kind in kinds_of(band)]
-    solved = jobs.solve(problem, places, "checking reciprocity")
-    return reciprocity_error(solved, problem.grating.sides)
+    return matrices.reshape(*matrices.shape[:-2], MUELLER)[..., :count]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...columns import read_columns
-from ...errors import DiffractionError, quoted, warn
+from ...errors import DiffractionError, check_choice, quoted, warn
 from ...files import FileKind, kind_of
 from ...heights.lengths import micrometres_of, number_between
 
@@ -186,10 +186,7 @@ def lamellar(period: float, depth: float, duty: float = 0.5) -> Profile:
 
 def blazed(period: float, depth: float, direction: str = "descending") -> Profile:
     """Sawtooth that descends (or ascends) towards +x, with a vertical step back; µm."""
-    if direction not in ("descending", "ascending"):
-        raise DiffractionError(
-            f"blazed: direction: expected 'descending' or 'ascending', got {direction!r}"
-        )
+    check_choice("blazed: direction", direction, ("descending", "ascending"))
     ends = [1, 0] if direction == "descending" else [0, 1]
     name = f"blazed {period:g}/{_depth('blazed', depth):g} µm, {direction}"
     return Profile(np.array([0, period]), depth * np.array(ends, float), period, name)

@@ -94,8 +94,13 @@ class SolvedRecipe:
                 raise DiffractionError(f"arguments: expected a section, got {quoted(arguments)}")
             layers, beneath = (_layers(content, key, file.parent) for key in ("layers", "beneath"))
             substrate = content.get("substrate")
+            if beneath and "profile" not in content:
+                flat = profile_of("lamellar", {**arguments, "depth": 0.0})
+                profile = replace(flat, name=f"slices over {flat.period:g} µm")
+            else:
+                profile = profile_of(content.get("profile"), arguments, file.parent)
             return cls(
-                _profile(content, arguments, file.parent, bool(beneath)),
+                profile,
                 str(content.get("material", "Al")),
                 number_between(content.get("superstrate", 1.0), "superstrate", 1, 5),
                 _flag(content, "thin"),
@@ -134,16 +139,6 @@ def profile_of(name: Any, arguments: Mapping[str, Any], folder: Path = Path()) -
     if "depth" not in arguments:
         raise DiffractionError(f"profile {name!r} needs its depth in µm")
     return make(**arguments)
-
-
-def _profile(
-    content: Mapping[str, Any], arguments: Mapping[str, Any], folder: Path, flat: bool
-) -> Profile:
-    """Return a recipe's profile; a flat one without a name, if that is allowed."""
-    if flat and "profile" not in content:
-        line = profile_of("lamellar", {**arguments, "depth": 0.0})
-        return replace(line, name=f"slices over {line.period:g} µm")
-    return profile_of(content.get("profile"), arguments, folder)
 
 
 def _layers(content: Mapping[str, Any], key: str, folder: Path) -> Layers:

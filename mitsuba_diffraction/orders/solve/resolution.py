@@ -10,7 +10,6 @@ import numpy as np
 
 from ...errors import DiffractionError
 from .chandezon import stretched_period
-from .films import material_text
 from .jobs import CROSSED, MOST_RESOLUTION, Jobs, Problem
 from .nodes import AnyPlace, Place, kinds_of
 from .stations import Real, reversed_light
@@ -41,28 +40,37 @@ class Chosen(NamedTuple):
     error: float
 
 
-def chosen_resolution(
+def resolved(
     problem: Problem,
     jobs: Jobs,
     places: Sequence[AnyPlace],
     tolerance: float,
     ports: Ports | None = None,
 ) -> Chosen:
-    """Raise the resolution until the next one changes the light in orders by `tolerance` at most.
+    """Return a problem with its error.
+
+    A resolution of 0 is raised until the next one changes the light in orders by `tolerance` at
+    most.
 
     places : where resolutions are compared, such as `places_to_test`.
     ports : whose light is compared; None compares all. Long periods have hundreds in a station, of
         which those at grazing incidence converge last.
 
-    Raises a DiffractionError if it does not converge.
+    Raises a DiffractionError if it does not converge, or the grating reflects nothing.
     """
-    coarse = replace(problem, resolution=coarsest(problem))
-    values = jobs.solve(coarse, places, "choosing the resolution")
+    given, text = problem.resolution, "choosing the resolution"
+    coarse = replace(problem, resolution=given or coarsest(problem))
+    values = jobs.solve(coarse, places, "checking the resolution" if given else text)
     for number in range(_MOST):
         if number and _finer(coarse) > MOST_RESOLUTION[problem.method]:
             break
-        fine, finer, error = _refined(coarse, values, jobs, places, ports)
+        fine = finer_problem(coarse)
+        finer = jobs.solve(fine, places, text)
         lit = _incident(values, ports)
+        after = _incident(finer, ports)
+        error = _changed(problem, [(lit[place], after[place]) for place in places])
+        if given:
+            return Chosen(problem, error)
         excess = max(float(each.sum(axis=(3, 4)).max()) for each in lit.values()) - 1.0
         if problem.grating.thin:  # which loses no light either
             excess = energy_error(lit.values())
@@ -80,27 +88,6 @@ def chosen_resolution(
     )
 
 
-def resolved(
-    problem: Problem,
-    jobs: Jobs,
-    places: Sequence[AnyPlace],
-    tolerance: float,
-    ports: Ports | None = None,
-) -> Chosen:
-    """Return a problem with its error; a resolution of 0 is chosen, see `chosen_resolution`."""
-    if problem.resolution == 0:
-        return chosen_resolution(problem, jobs, places, tolerance, ports)
-    return Chosen(problem, resolution_error(problem, jobs, places, ports))
-
-
-def resolution_error(
-    problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], ports: Ports | None = None
-) -> float:
-    """Return the share of the light at some places that the next resolution changes."""
-    values = jobs.solve(problem, places, "checking the resolution")
-    return _refined(problem, values, jobs, places, ports)[2]
-
-
 def _incident(solved: Mapping[Any, Real], ports: Ports | None) -> dict[Any, Real]:
     """Return the efficiencies (w, j, 2, q, 2) of light that is incident in some ports j."""
     if ports is None:
@@ -108,29 +95,22 @@ def _incident(solved: Mapping[Any, Real], ports: Ports | None) -> dict[Any, Real
     return {place: values[:, ports[place]] for place, values in solved.items()}
 
 
-def _refined(
-    problem: Problem,
-    values: Mapping[Any, Real],
-    jobs: Jobs,
-    places: Sequence[AnyPlace],
-    ports: Ports | None,
-) -> tuple[Problem, dict[Any, Real], float]:
-    """Return the problem at the next resolution, its efficiencies, and the share that changes.
+def _changed(problem: Problem, values: Sequence[tuple[Real, Real]]) -> float:
+    """Return the share of the light that changes from one resolution to the next.
+
+    values : efficiencies of both, of each place.
 
     Raises a DiffractionError if the grating reflects nothing.
     """
-    fine = finer_problem(problem)
-    finer = jobs.solve(fine, places, "choosing the resolution")
-    before, after = _incident(values, ports), _incident(finer, ports)
-    missed = sum(float(np.abs(after[p] - before[p]).sum()) for p in places)
-    light = sum(float(after[p].sum()) for p in places)
-    if light < _DARK * sum(after[p].shape[1] for p in places):
+    missed = sum(float(np.abs(after - before).sum()) for before, after in values)
+    light = sum(float(after.sum()) for _, after in values)
+    if light < _DARK * sum(after.shape[1] for _, after in values):
         raise DiffractionError(
-            f"{problem.grating.profile.name} of {material_text(problem.grating)} reflects no "
+            f"{problem.grating.profile.name} of {problem.grating.material_text} reflects no "
             "light; choose materials that differ from the medium above, and layers that light "
             "passes"
         )
-    return fine, finer, missed / light
+    return missed / light
 
 
 def finer_problem(problem: Problem) -> Problem:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from ...heights.lengths import count_between, number_between
-from .films import material_text
 from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, solver_of
 from .nodes import AnyPlace
 from .resolution import STEP, Chosen, coarsest
@@ -71,7 +70,7 @@ def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
     grating = chosen.problem.grating
     return {
         "solver": solver_of(chosen.problem).name,
-        "material": material_text(grating),
+        "material": grating.material_text,
         "profile": grating.profile.name,
         "depth": grating.profile.depth,
         "solver_error": chosen.error,
@@ -80,36 +79,25 @@ def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
 
 
 def announce_stage(
-    announce: Callable[[Estimate], None],
-    stage: str,
-    problem: Problem,
-    jobs: Jobs,
-    places: Sequence[AnyPlace],
-    size: float = 0.0,
+    stage: str, problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], size: float = 0.0
 ) -> None:
     """Time some of the stage's missing stations and announce it; size : of its table, bytes."""
-    if announce is silent or not (places := jobs.missing(problem, places)):
+    if jobs.announce is None or not (places := jobs.missing(problem, places)):
         return
     some = places[len(places) // (2 * _TIMED) :: max(len(places) // _TIMED, 1)]
     seconds = sum(jobs.seconds(problem, place) for place in some)
     solutions = sum(len(place.w) for place in places)
     seconds *= solutions / sum(len(place.w) for place in some)
-    announce(Estimate(stage, len(places), solutions, seconds, size))
+    jobs.announce(Estimate(stage, len(places), solutions, seconds, size))
 
 
-def announce_comparison(
-    announce: Callable[[Estimate], None], problem: Problem, jobs: Jobs, places: Sequence[AnyPlace]
-) -> None:
+def announce_comparison(problem: Problem, jobs: Jobs, places: Sequence[AnyPlace]) -> None:
     """Time a solution at the first resolution, and announce the comparison with the next one."""
-    if announce is silent:
+    if jobs.announce is None:
         return
     first = replace(problem, resolution=problem.resolution or coarsest(problem))
     seconds = jobs.seconds(first, places[0]) / len(places[0].w)
     solutions = sum(len(place.w) for place in places)
     # a solution costs as its matrices: the cube of the resolution
     both = seconds * solutions * (1.0 + STEP**3)
-    announce(Estimate("choosing the resolution", len(places), 2 * solutions, both))
-
-
-def silent(estimate: Estimate) -> None:
-    """Announce nothing."""
+    jobs.announce(Estimate("choosing the resolution", len(places), 2 * solutions, both))

@@ -19,10 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from ...errors import DiffractionError
 from ...optics import fresnel
-from ..table import LEAST_BLOCK
-from .grating_index import TabulatedIndex
 from .stations import Complex, Real, Station
 
 #: Share of the light that a totally reflecting side sends back: where a channel has no way out, as
@@ -30,21 +27,6 @@ from .stations import Complex, Real, Station
 _KEPT = 1.0 - 1e-7
 #: Square of the sine below which light is taken as that along the normal.
 _LEVEL = 1e-12
-
-
-def check_clear(material: TabulatedIndex, wavelengths: tuple[float, float]) -> None:
-    """Refuse materials that light does not go through.
-
-    wavelengths : shortest and longest, in vacuum, nm.
-
-    Raises a DiffractionError if the material absorbs, or has an index below `LEAST_BLOCK`.
-    """
-    index = material.index(wavelengths)
-    if index is None or index.imag.any() or index.real.min() < LEAST_BLOCK:
-        raise DiffractionError(
-            f"material {material.name}: light goes through a clear material only; "
-            f"give its index, a real number of {LEAST_BLOCK:g} to 100, such as 1.58"
-        )
 
 
 def sheet_efficiencies(amplitudes: Complex, station: Station) -> Real:

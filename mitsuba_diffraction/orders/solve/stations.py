@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import cells
 from ..response import orders_between
+from .films import Structure
 from .grating_index import TabulatedIndex
 from .profiles import Profile, UnitCell
-from .structure import Structure
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -85,6 +85,24 @@ class Grating:
     def is_perfect(self) -> bool:
         """Whether the material is a perfect conductor, whose efficiencies do not depend on w."""
         return self.material.values is None
+
+    @property
+    def material_text(self) -> str:
+        """Materials from the top, for people."""
+        slices = self.structure.slices
+        films = (
+            f"{film.material.name} {film.thickness:g} µm" for film in reversed(self.structure.films)
+        )
+        lower = [
+            f"{' and '.join(dict.fromkeys(part.material.name for part in layer.parts)) or 'gap'} "
+            f"{layer.thickness:g} µm"
+            for layer in reversed(slices)
+        ]
+        if len(lower) > 4:
+            lower = [*lower[:2], f"{len(lower) - 3} layers", lower[-1]]
+        own = [self.material.name] if self.profile.depth or not slices else []
+        lowest = self.structure.substrate or (self.material if slices else None)
+        return " on ".join([*films, *own, *lower, *([lowest.name] if lowest else [])])
 
     def station(
         self,

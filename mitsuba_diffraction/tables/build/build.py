@@ -26,7 +26,6 @@ from .checks import (
     TAPS_SHARE,
     check_patches,
     check_size,
-    check_taylor,
     check_units,
     check_window,
     too_wide,
@@ -37,6 +36,7 @@ from .choose import (
     PACKET,
     series_expansion,
     taylor_expansion,
+    taylor_rounding,
     too_many_intervals,
 )
 from .coefficients import coefficients_of, half_precision
@@ -283,7 +283,14 @@ def _first(wanted: _Wanted) -> _Setting:
     functions = None
     if settings.basis == "taylor":
         expansion = taylor_expansion(*asked)
-        check_taylor(wanted.deepest, expansion, tolerance)
+        # single precision does not survive some series
+        rounding = taylor_rounding(wanted.deepest, expansion.kappa_max, expansion.terms)
+        if rounding > tolerance:
+            raise build_error(
+                f"basis='taylor' cannot reach tolerance={tolerance:g} for heights of "
+                f"{wanted.deepest.range:.3g} µm: its terms cancel, with a predicted error of "
+                f"{rounding:.2g} in single precision; use basis='svd'"
+            )
     else:
         expansion, functions = series_expansion(*asked, settings.basis)
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
@@ -310,8 +317,18 @@ def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
         # A cut-out looked simpler than the whole patch; series are longer than functions are many
         longer = replace(setting.expansion, terms=max(setting.expansion.terms, PACKET + 2))
         return replace(setting, functions=PACKET, expansion=longer)
-    longer = _extended(setting.expansion, functions, terms, attempt.error(), tolerance)
-    return replace(setting, expansion=longer)
+    expansion, error = setting.expansion, attempt.error()
+    if expansion.basis == "chebyshev":
+        if expansion.intervals >= MAX_INTERVALS:
+            raise too_many_intervals(expansion, functions or expansion.terms, error)
+        intervals = max(expansion.intervals + 1, expansion.intervals * 5 // 4)
+        return replace(setting, expansion=replace(expansion, intervals=intervals))
+    if terms is not None:
+        raise build_error(
+            f"terms={terms} of basis='taylor' leave an error of {error:.2g}, more than "
+            f"tolerance={tolerance:g}; leave terms out, raise it, or use basis='svd'"
+        )
+    return replace(setting, expansion=replace(expansion, terms=expansion.terms + 3))
 
 
 def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionTable:
@@ -349,21 +366,3 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
 def _more(taps: int) -> int:
     """Return one tap more, or a sixth more where many are read."""
     return taps + max(1, taps // 6)
-
-
-def _extended(
-    expansion: Expansion, functions: int | None, terms: int | None, error: float, tolerance: float
-) -> Expansion:
-    """A longer series, or an error where the user fixed its length."""
-    if expansion.basis == "chebyshev":
-        if expansion.intervals >= MAX_INTERVALS:
-            raise too_many_intervals(expansion, functions or expansion.terms, error)
-        return replace(
-            expansion, intervals=max(expansion.intervals + 1, expansion.intervals * 5 // 4)
-        )
-    if terms is not None:
-        raise build_error(
-            f"terms={terms} of basis='taylor' leave an error of {error:.2g}, more than "
-            f"tolerance={tolerance:g}; leave terms out, raise it, or use basis='svd'"
-        )
-    return replace(expansion, terms=expansion.terms + 3)

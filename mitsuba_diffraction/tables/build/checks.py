@@ -18,7 +18,6 @@ from ..expansion import Expansion
 from ..layout import Grid
 from ..table import build_error
 from ..window import taps_for
-from .choose import taylor_rounding
 
 #: The coherence window is at most so many patches wide: a patch of one period is tiled.
 MOST_PATCHES = 400
@@ -125,17 +124,6 @@ def too_wide(
         f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it, "
         f"windows={width:g}, or crop the heights, crop={width:g}"
     )
-
-
-def check_taylor(heights: HeightField, expansion: Expansion, tolerance: float) -> None:
-    """Refuse a Taylor series that single precision does not survive."""
-    rounding = taylor_rounding(heights, expansion.kappa_max, expansion.terms)
-    if rounding > tolerance:
-        raise build_error(
-            f"basis='taylor' cannot reach tolerance={tolerance:g} for heights of "
-            f"{heights.range:.3g} µm: its terms cancel, with a predicted error of {rounding:.2g} "
-            "in single precision; use basis='svd'"
-        )
 
 
 def check_size(grid: Grid, expansion: Expansion, functions: int | None) -> None:

@@ -107,27 +107,19 @@ def too_many_intervals(expansion: Expansion, terms: int, error: float) -> Diffra
 def taylor_expansion(
     heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
 ) -> Expansion:
-    """The Taylor series with as many terms as `taylor_truncation` asks for."""
-    count = terms or 1
-    if terms is None:
-        while taylor_truncation(heights, kappa_max, count) > budget and count < 400:
-            count += 1
-    return Expansion("taylor", "amplitude", count, 1, kappa_max, 0.5 * heights.range)
-
-
-def taylor_truncation(heights: HeightField, kappa_max: float, terms: int) -> float:
-    """Bound on the relative L1 error of Σ|a|² after `terms` Taylor terms (n = 1 … terms).
+    """The Taylor series with as many terms as bring a bound below the budget.
 
     |exp(iφ) − Σ_{n≤N} (iφ)ⁿ/n!| ≤ |φ|^(N+1)/(N+1)!; by Parseval the amplitudes are off by its
     root mean square δ over the patch, and the power, by Cauchy and Schwarz, by at most 2δ.
     """
-    log_x, log_moment = _log_moments(heights, kappa_max, terms + 1)
-    return _exp(
-        math.log(2.0)
-        + (terms + 1) * log_x
-        - scipy.special.gammaln(terms + 2)
-        + 0.5 * log_moment[-1]
-    )
+    count = terms or 1
+    while terms is None and count < 400:
+        log_x, log_moment = _log_moments(heights, kappa_max, count + 1)
+        log_bound = (count + 1) * log_x - scipy.special.gammaln(count + 2) + 0.5 * log_moment[-1]
+        if _exp(math.log(2.0) + log_bound) <= budget:
+            break
+        count += 1
+    return Expansion("taylor", "amplitude", count, 1, kappa_max, 0.5 * heights.range)
 
 
 def taylor_rounding(heights: HeightField, kappa_max: float, terms: int) -> float:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,8 +39,9 @@ def coefficients_of(
     """
     if expansion.basis == "taylor":
         return Coefficients(*_taylor(spectra, grid, expansion), expansion)
-    values_at, components = (_powers_at, 1) if expansion.kind == "power" else (_amplitudes_at, 2)
+    components = 1 if expansion.kind == "power" else 2
     terms, near = functions or expansion.terms, _near(grid, components)
+    inner = _inner(spectra, grid)
     shape = *grid.shape, components
     result = np.empty((expansion.intervals, *shape, terms), np.float32)
     order_0 = np.empty((expansion.intervals, components, expansion.terms))
@@ -50,7 +49,21 @@ def coefficients_of(
     flat = values.reshape(expansion.terms, -1)
     all_series = []
     for interval in range(expansion.intervals):
-        at_nodes = list(values_at(spectra, grid, expansion, interval, values))
+        nodes, specular = expansion.nodes(interval).tolist(), expansion.order_0_offset(interval)
+        # Order 0, whose bin is left empty: a grating may put it out nearly altogether, so that it
+        # takes double precision
+        at_nodes: list[tuple[float, ...]] = []
+        if expansion.kind == "power":
+            for out, power in zip(values, spectra.powers(nodes), strict=True):
+                out[..., 0] = power.bins[inner]
+                at_nodes.append((power.change if specular else power.order_0,))
+        else:  # of the only patch
+            for out, kappa in zip(values, nodes, strict=True):
+                amplitude = spectra.amplitudes(kappa, grid.coherent)[inner]
+                less = complex(amplitude[grid.middle])  # a_0 − 1
+                amplitude[grid.middle] = 0.0
+                out[..., 0], out[..., 1] = amplitude.real, amplitude.imag
+                at_nodes.append((less.real + 1.0 - float(specular), less.imag))
         fit = expansion.fit(interval)
         order_0[interval] = np.transpose(at_nodes) @ fit
         if functions is not None:
@@ -67,8 +80,13 @@ def _taylor(
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
     """Coefficients DFT[iⁿ(2h/H)ⁿ] of all bins, and of order 0."""
     result = np.empty((1, *grid.shape, 2, expansion.terms), np.float32)
+    half = expansion.half_range or 1.0  # flat heights are 0
     for n in range(1, expansion.terms + 1):
-        amplitude = spectra.first.of(partial(_height_power, expansion.half_range, n))
+
+        def powered(heights: NDArray[Any], n: int = n) -> NDArray[Any]:
+            return (heights / half) ** n
+
+        amplitude = spectra.first.of(powered)
         amplitude = amplitude[_inner(spectra, grid)]
         if grid.coherent:
             alternate(amplitude, grid.last)
@@ -91,42 +109,6 @@ def _near(grid: Grid, components: int) -> NDArray[np.int64]:
     return np.asarray((bins[:, None] * components + np.arange(components)).ravel())
 
 
-def _powers_at(
-    spectra: PatchSpectra,
-    grid: Grid,
-    expansion: Expansion,
-    interval: int,
-    values: NDArray[np.float32],
-) -> Iterator[tuple[float]]:
-    """Powers of all bins (ny, nx, 1) at the nodes of an interval, written to `values`.
-
-    Gives the value of order 0, whose bin is left empty: a grating may put it out nearly
-    altogether, so that it takes double precision.
-    """
-    specular = float(expansion.order_0_offset(interval))
-    inner = _inner(spectra, grid)
-    for out, power in zip(values, spectra.powers(expansion.nodes(interval).tolist()), strict=True):
-        out[..., 0] = power.bins[inner]
-        yield (power.change if specular else power.order_0,)
-
-
-def _amplitudes_at(
-    spectra: PatchSpectra,
-    grid: Grid,
-    expansion: Expansion,
-    interval: int,
-    values: NDArray[np.float32],
-) -> Iterator[tuple[float, float]]:
-    """Real and imaginary parts of the only patch's (ny, nx, 2), likewise."""
-    specular = float(expansion.order_0_offset(interval))
-    for out, kappa in zip(values, expansion.nodes(interval).tolist(), strict=True):
-        amplitude = spectra.amplitudes(kappa, grid.coherent)[_inner(spectra, grid)]
-        less = complex(amplitude[grid.middle])  # a_0 − 1
-        amplitude[grid.middle] = 0.0
-        out[..., 0], out[..., 1] = amplitude.real, amplitude.imag
-        yield less.real + 1.0 - specular, less.imag
-
-
 def _inner(spectra: PatchSpectra, grid: Grid) -> tuple[slice, slice]:
     """Slices of the grid's bins within a spectrum, whose margin serves the error estimate."""
     rows, columns = (
@@ -134,11 +116,6 @@ def _inner(spectra: PatchSpectra, grid: Grid) -> tuple[slice, slice]:
         for outer, last in zip(spectra.last[::-1], grid.last[::-1], strict=True)
     )
     return rows, columns
-
-
-def _height_power(half_range: float, n: int, heights: NDArray[Any]) -> NDArray[Any]:
-    """(2h/H)ⁿ."""
-    return (heights / half_range) ** n if half_range > 0.0 else np.zeros_like(heights)
 
 
 _HALF_PEAK = 2.0**14  # largest stored half float: far from its overflow, the rest far from its zero

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ..expansion import Expansion, series_sum
 from ..layout import Grid
-from ..window import apply_window, rows_by_trim, tap_matrix
+from ..window import apply_window, tap_matrix
 from .powers import PatchSpectra
 from .spectrum import GLOSSY_RADIUS
 
@@ -55,7 +55,9 @@ class ErrorMeter:
         self._lobe: list[NDArray[Any]] = []
         self._wide: list[scipy.sparse.csr_array] = []
         tapped: list[list[scipy.sparse.csr_array]] = []
-        rows = rows_by_trim(grid.taps, grid.trims)
+        rows: dict[range, list[int]] = {}  # by the columns that are read
+        for row, columns in enumerate(grid.tapped()):
+            rows.setdefault(columns, []).append(row)
         for axis in (0, 1):
             outer = min(int(grid.radius[axis]), spectra.last[axis])
             bins = np.arange(-outer, outer + 1)
@@ -66,10 +68,9 @@ class ErrorMeter:
             wide = tap_matrix(
                 positions, -spectra.last[axis], spectra.shape[1 - axis], exponent, None
             )
-            chosen = [range(trim, grid.taps[0] - trim) for trim in rows]
             few = [
                 tap_matrix(positions, -last, 2 * last + 1, exponent, grid.taps[axis], numbers)
-                for numbers in (chosen if axis == 0 else rows.values())
+                for numbers in (rows if axis == 0 else rows.values())
             ]
             self._wide.append(wide.astype(self._real))
             tapped.append([matrix.astype(self._real) for matrix in few])

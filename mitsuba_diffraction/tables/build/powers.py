@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -132,11 +132,9 @@ def _batch_sums(
 ) -> list[Power]:
     """Sums over some windows, one for every κ; as many windows at a time as there are threads."""
     threads = min(os.cpu_count() or 1, _MOST_THREADS, len(windows))
-    if threads == 1:
-        return _sums((windows.spectrum(n, last, double) for n in range(len(windows))), kappas)
 
     def powers_of(n: int) -> list[Power]:
-        spectrum = windows.spectrum(n, last, double, threaded=False)
+        spectrum = windows.spectrum(n, last, double, threaded=threads == 1)
         return [Power.of(spectrum, kappa) for kappa in kappas]
 
     total: list[Power] = []
@@ -147,19 +145,8 @@ def _batch_sums(
     return total
 
 
-def _sums(spectra: Iterable[Spectrum], kappas: Sequence[float]) -> list[Power]:
-    """Sums over spectra, one for every κ."""
-    total: list[Power] = []
-    for spectrum in spectra:
-        _add(total, (Power.of(spectrum, kappa) for kappa in kappas))
-    return total
-
-
-def _add(total: list[Power], more: Iterable[Power]) -> None:
-    """Add a power for every κ to the sums; append it to empty sums."""
-    started = bool(total)
-    for n, power in enumerate(more):
-        if started:
-            total[n].add(power)
-        else:
-            total.append(power)
+def _add(total: list[Power], more: list[Power]) -> None:
+    """Add a power for every κ to the sums; empty sums are replaced."""
+    for power, other in zip(total, more, strict=False):
+        power.add(other)
+    total += more[len(total) :]

@@ -226,10 +226,11 @@ class Screens:
         }
 
     def roughness(self) -> list[ScaleRoughness]:
-        """Roughness of some of the windows, their heights tapered like the screens."""
+        """Roughness of some of the windows, evenly spread, their heights tapered like screens."""
+        numbers = np.unique(np.linspace(0, len(self) - 1, _ROUGHNESS_OF).round().astype(int))
         return [
             ScaleRoughness.from_heights((w.heights - w.heights.mean()) * self.taper, w.pixel_size)
-            for w in self.some()
+            for w in (self[int(n)] for n in numbers)
         ]
 
     def sharpened(self, powers: NDArray[Any]) -> NDArray[Any]:
@@ -262,11 +263,6 @@ class Screens:
     def taper(self) -> Reals:
         """Factor by which screens fade towards the edges: (ny or 1, nx or 1)."""
         return np.outer(*(np.ones(1) if t is None else t for t in self.tapers))
-
-    def some(self) -> Iterator[HeightField]:
-        """Some of the windows, evenly spread."""
-        numbers = np.unique(np.linspace(0, len(self) - 1, _ROUGHNESS_OF).round().astype(int))
-        return (self[int(n)] for n in numbers)
 
     @property
     def _pixels(self) -> tuple[float, float]:

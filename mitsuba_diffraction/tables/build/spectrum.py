@@ -60,7 +60,11 @@ class Spectrum:
         self.last, self._tile, self._threaded = last, filled(field.shape, tapers), threaded
         self._columns = _Crop(self._tile[1], last[0])
         self._rows = _Crop(self._tile[0], last[1])
-        self._tapers = None if tapers[0] is None and tapers[1] is None else self._filled(tapers)
+        # of mean square 1 over the tile, so that powers add up to the screen's (Parseval)
+        self._tapers = [
+            (np.ones(n) if taper is None else taper * np.sqrt(tile / n)).astype(self.real_type)
+            for n, taper, tile in zip(field.shape, tapers, self._tile, strict=True)
+        ]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -90,7 +94,7 @@ class Spectrum:
         ny = self.heights.shape[0]
         half = np.empty((ny, len(self._columns.bins)), self.complex_type)
         result = np.zeros(self.shape, self.complex_type)
-        faded, mean = (None, 0.0) if self._tapers is None else self._faded(function)
+        faded, mean = (None, 0.0) if self._tile == self.heights.shape else self._faded(function)
 
         def along_x(start: int) -> None:
             rows = slice(start, start + _ROWS)
@@ -124,7 +128,6 @@ class Spectrum:
         With this mean |a|² and the powers of w·(f − a) add up to the mean of |f|² under w². In bin
         0 a replaces what is left, which c makes up for.
         """
-        assert self._tapers is not None
         y, x = self._tapers
         values = function(self.heights).astype(self.complex_type, copy=False)
         # in double precision: orders are small beside a mean of nearly 1
@@ -139,14 +142,6 @@ class Spectrum:
         if power > left:
             values *= self.real_type(math.sqrt(power / (power - left)))
         return values, mean
-
-    def _filled(self, tapers: Tapers) -> tuple[NDArray[Any], NDArray[Any]]:
-        # of mean square 1 over the tile, so that powers add up to the screen's (Parseval)
-        y, x = (
-            np.ones(n) if taper is None else taper * np.sqrt(tile / n)
-            for n, taper, tile in zip(self.heights.shape, tapers, self._tile, strict=True)
-        )
-        return y.astype(self.real_type), x.astype(self.real_type)
 
 
 def filled(shape: tuple[int, int], tapers: Tapers) -> tuple[int, int]:

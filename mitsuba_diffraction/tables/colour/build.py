@@ -137,13 +137,19 @@ def wavelength_weights(step: float) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 def order_0_colour(
     table: DiffractionTable, radii: NDArray[np.float64], z: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """RGB of order 0 alone at these radii (n,) and z (m,), shape (n, m, 3), 1/µm²."""
+) -> NDArray[np.float32]:
+    """RGB of order 0 alone, and a 0, at these radii (n,) and z (m,), shape (n, m, 4), 1/µm².
+
+    It ends at the last radius.
+    """
     lam, weights = wavelength_weights(0.5 * lobe_of(table) / 2.0)
     kappa = np.minimum(2 * np.pi * z[:, None] / lam, table.expansion.kappa_max)
     power = order_0_power(table, kappa)
     lobe = np.exp(-((table.sigma_0 * 2 * np.pi * radii[:, None] / lam) ** 2)) * table.order_0_ratio
-    return np.einsum("nl,ml,lc->nmc", lobe, power, weights / lam[:, None] ** 2, optimize=True)
+    weights = np.pad(weights / lam[:, None] ** 2, [(0, 0), (0, 1)])
+    result = np.einsum("nl,ml,lc->nmc", lobe, power, weights, optimize=True).astype(np.float32)
+    result[-1] = 0.0
+    return result
 
 
 class OtherOrders:

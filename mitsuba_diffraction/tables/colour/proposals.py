@@ -51,8 +51,14 @@ def colour_proposals(table: ColourTable) -> ColourProposals:
     rings = np.zeros((BANDS, grid.rings), np.float32)
     azimuths = np.zeros((BANDS, grid.bins), np.float32)
     for band in range(BANDS):
-        bright = _of_band(table, band)
-        inside = [_inside(bright, table, ring) for ring in range(grid.rings)]
+        # brightness over the band's range of z
+        centre = BANDED * (band + 0.5) / BANDS
+        shares = np.clip(centre + _SPREAD * np.linspace(-0.75, 0.75, _ZS), 0.02, 1.0)
+        bright = brightness(table, shares * table.expansion.kappa_max)
+        inside = []
+        for start, count in zip(map(grid.start, range(grid.rings)), grid.counts, strict=True):
+            values = bright[start : start + count + 1].astype(float)
+            inside.append(values[1:] + values[:-1])
         power = np.zeros(grid.rings - 1)
         for ring in range(grid.rings - 1):
             count = grid.counts[ring]
@@ -69,13 +75,6 @@ def colour_proposals(table: ColourTable) -> ColourProposals:
     return ColourProposals(rings, azimuths, rings[:, -1] > 0.0, _order_0(table))
 
 
-def _of_band(table: ColourTable, band: int) -> NDArray[np.float32]:
-    """Brightness (bins,) over the band's range of z, without order 0."""
-    centre = BANDED * (band + 0.5) / BANDS
-    shares = np.clip(centre + _SPREAD * np.linspace(-0.75, 0.75, _ZS), 0.02, 1.0)
-    return brightness(table, shares * table.expansion.kappa_max)
-
-
 def brightness(table: ColourTable, zs: NDArray[np.float64]) -> NDArray[np.float32]:
     """Sum over some z of the brightness in each bin, without order 0, (bins,)."""
     expansion = table.expansion
@@ -85,13 +84,6 @@ def brightness(table: ColourTable, zs: NDArray[np.float64]) -> NDArray[np.float3
         packet[: 3 * TERMS] = np.outer(IMPORTANCE, weights).ravel() / table.scale
         total += np.maximum(table.coefficients[interval].astype(np.float32) @ packet, 0.0)
     return total
-
-
-def _inside(bright: NDArray[np.float32], table: ColourTable, ring: int) -> NDArray[np.float64]:
-    """Mean brightness between the azimuths of a ring (count,)."""
-    start, count = table.grid.start(ring), table.grid.counts[ring]
-    values = bright[start : start + count + 1].astype(float)
-    return values[1:] + values[:-1]
 
 
 def _resampled(cells: NDArray[np.float64], count: int) -> NDArray[np.float64]:

@@ -104,7 +104,9 @@ class ColourTable:
             expansion=expansion,
             coefficients=values.astype(np.float16),
             scale=scale,
-            order_0=_order_0(table, np.linspace(0.0, radius_end, _RADII), z_max, min(zs, 4096)),
+            order_0=order_0_colour(
+                table, np.linspace(0.0, radius_end, _RADII), np.linspace(0.0, z_max, min(zs, 4096))
+            ),
             radius_end=radius_end,
             sigma=table.sigma,
             sigma_0=table.sigma_0,
@@ -179,15 +181,6 @@ def _pair(
     lower = np.floor(position).astype(np.int64)
     upper = position - lower
     return [(lower, 1.0 - upper), (lower + 1, upper)]
-
-
-def _order_0(
-    table: DiffractionTable, radii: NDArray[np.float64], z_max: float, zs: int
-) -> NDArray[np.float32]:
-    result = np.zeros((len(radii), zs, 4), np.float32)
-    result[..., :3] = order_0_colour(table, radii, np.linspace(0.0, z_max, zs))
-    result[-1] = 0.0
-    return result
 
 
 def _expansion(

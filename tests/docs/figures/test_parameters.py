@@ -68,7 +68,7 @@ def test_the_choices_are_those_of_the_code(some_variant):
     from mitsuba_diffraction.heights import preprocess
     from mitsuba_diffraction.heights import read as options
     from mitsuba_diffraction.plugin.directions import SHADOWINGS
-    from mitsuba_diffraction.tables.expansion import BASES
+    from mitsuba_diffraction.settings import BASES
 
     choices = {
         "fill": ("none", *preprocess.FILLS),

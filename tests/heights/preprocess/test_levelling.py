@@ -70,7 +70,7 @@ def test_nothing_to_clip_changes_nothing_and_says_so():
 @pytest.mark.parametrize("sigmas", [0, -1, 0.5, float("nan"), float("inf")])
 def test_clip_needs_a_sensible_width(sigmas):
     with pytest.raises(DiffractionError, match="clip"):
-        clip_outliers(HeightField(ROUGH, 0.1), sigmas)
+        HeightField(ROUGH, 0.1).treated(clip=sigmas)
 
 
 def test_clip_refuses_heights_without_a_deviation():

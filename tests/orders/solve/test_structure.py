@@ -16,10 +16,10 @@ from docs.make.validation.stacks import (
 from docs.make.validation.stacks import stacked as grating
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
-from mitsuba_diffraction.orders.solve.films import material_text, read_layers
+from mitsuba_diffraction.orders.solve.films import read_layers
 from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of
 from mitsuba_diffraction.orders.solve.profiles import lamellar, sinusoidal
-from mitsuba_diffraction.orders.solve.resolution import places_to_test, resolution_error
+from mitsuba_diffraction.orders.solve.resolution import places_to_test, resolved
 from mitsuba_diffraction.orders.solve.stations import reversed_light
 
 PERIOD = 0.5
@@ -107,7 +107,7 @@ def test_layers_are_read_from_a_file(tmp_path):
     assert len(layers) == 4
     surface = grating(lamellar(PERIOD, 0.05), beneath=layers)
     assert len(surface.structure.slices) == 4
-    assert "chitin and melanin 0.06 µm" in material_text(surface)
+    assert "chitin and melanin 0.06 µm" in surface.material_text
 
 
 def test_the_structure_identifies_a_problem():
@@ -144,4 +144,4 @@ def test_a_grating_of_the_medium_above_is_refused():
         surface = grating(lamellar(PERIOD, 0.1), "1.2", 1.2, beneath=beneath)
         problem = problem_of(surface, "coupled", 8)
         with pytest.raises(DiffractionError, match="reflects no light"):
-            resolution_error(problem, Jobs(), places_to_test(range(2)))
+            resolved(problem, Jobs(), places_to_test(range(2)), 0.01)

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
 from mitsuba_diffraction.heights.coherence import LOOKUP, resolved, window_corners
-from mitsuba_diffraction.heights.validity import tilt_warning
+from mitsuba_diffraction.heights.validity import tilted
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build import powers as powers_module
@@ -241,7 +241,7 @@ def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
     assert parts.rms_height == pytest.approx(whole.rms_height, rel=1e-12)
     level = parts.treated(level="plane")
     assert "RMS change" in level.history[-1]
-    line = tilt_warning(parts, 0.4)
+    tilt = tilted(parts, 0.4)
     monkeypatch.undo()
     assert level.history == whole.treated(level="plane").history
-    assert line == tilt_warning(whole, 0.4)
+    assert tilt is tilted(whole, 0.4)
