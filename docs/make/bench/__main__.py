@@ -21,7 +21,13 @@ from mitsuba_diffraction.cli.console import say_warning
 from mitsuba_diffraction.cli.report import save_json
 from mitsuba_diffraction.errors import DiffractionError
 
-from ..figures.pages import measured_options, measured_patch, option, program
+from ..figures.pages import (
+    measured_options,
+    measured_patch,
+    option,
+    program,
+    progress_option,
+)
 from . import figures, sections
 
 PARTS = (
@@ -42,10 +48,7 @@ PARTS = (
         "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
         help="folder of the project's scenes; default: scenes",
     ),
-    option(
-        "--progress", action=argparse.BooleanOptionalAction, default=None,
-        help="show progress bars; by default on a terminal",
-    ),
+    progress_option(),
     *measured_options("height field to measure; default: gratings.elaphe_like"),
 )  # fmt: skip
 def main(args: argparse.Namespace) -> None:

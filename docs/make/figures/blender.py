@@ -19,7 +19,6 @@ import mitsuba_diffraction as md
 from docs.make.blender.compare import Comparison, compare
 from docs.make.blender.program import run_in_blender, seconds
 from docs.make.blender.views import LIGHTS, Surface, View
-from mitsuba_diffraction.cli import main as run_command
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
@@ -57,9 +56,7 @@ class Example:
     def export(self) -> None:
         """Export the surface unless it is there."""
         if not list(self.folder.glob("*.osl")):
-            words = ["export-osl", self.source, "-o", str(self.folder)]
-            if run_command(words) != 0:
-                raise DiffractionError(f"'{' '.join(words)}' failed; see above")
+            pages.run("export-osl", self.source, "-o", self.folder)
 
     def surface(self) -> Surface:
         """Return the material of both renderers."""

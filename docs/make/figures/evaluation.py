@@ -19,7 +19,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
@@ -181,8 +180,8 @@ def main(args: argparse.Namespace) -> None:
             )
         )
     pages.update(args.output, {"periods": period_table(results)})
-    with atomic_path(args.output.parent / "images" / "evaluation.png") as path:
-        evaluation_figure(results).savefig(path, format="png")
+    picture = args.output.parent / "images" / "evaluation.png"
+    pages.write_figure(picture, evaluation_figure(results))
 
 
 if __name__ == "__main__":

@@ -8,12 +8,10 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.heights.read import OPTIONS
 
@@ -137,20 +135,12 @@ _MOST = 10
 PAGES = {"commands.md": commands_page, "python.md": python_page}
 
 
-def write_pages(folder: Path) -> Iterator[Path]:
-    """Write the pages and yield their paths."""
-    for name, made in PAGES.items():
-        with atomic_path(folder / name) as temporary:
-            temporary.write_text(made(), encoding="utf-8")
-        yield folder / name
-
-
 @program(option("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs")))
 def main(args: argparse.Namespace) -> None:
     """Write the pages."""
-    folder: Path = args.output
-    for path in write_pages(folder):
-        print(f"wrote {path}")
+    for name, made in PAGES.items():
+        pages.write_text(args.output / name, made())
+        print(f"wrote {args.output / name}")
 
 
 if __name__ == "__main__":

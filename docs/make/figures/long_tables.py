@@ -12,9 +12,7 @@ import re
 import sys
 from pathlib import Path
 
-from mitsuba_diffraction.atomic import atomic_path
-
-from .pages import option, program
+from .pages import option, program, write_text
 
 #: Rows from which a table is a file.
 LONG = 6
@@ -37,8 +35,7 @@ def write_page(path: Path, text: str) -> list[Path]:
         if f"]({old.name})" not in shown:
             old.unlink()
     for name, content in (*tables.items(), (path.name, shown)):
-        with atomic_path(path.parent / name) as temporary:
-            temporary.write_text(content, encoding="utf-8")
+        write_text(path.parent / name, content)
     return [path, *(path.parent / name for name in tables)]
 
 

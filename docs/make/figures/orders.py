@@ -6,8 +6,6 @@ python -m docs.make.figures.orders [--quick] [--only cd]
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import sys
 import tempfile
 import time
@@ -22,8 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from mitsuba_diffraction.cli import main as run_command
-from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import natural
 from mitsuba_diffraction.scene.load import load_scene, set_variant
@@ -162,13 +158,10 @@ def _file(scene: Scene) -> Path:
 
 
 def _render(scene: Scene, output: Path, options: Sequence[str]) -> Rendered:
-    words = ["render", str(_file(scene)), "-o", str(output), *options]
     seconds = 0.0
     for few in (["-s", "1"], []):  # the first compiles, and builds tables
         start = time.process_time()
-        with contextlib.redirect_stdout(io.StringIO()):
-            if run_command([*words, *few]) != 0:
-                raise DiffractionError(f"'{' '.join(words)}' failed; see above")
+        pages.run("render", _file(scene), "-o", output, *options, *few)
         seconds = time.process_time() - start
     pixels = _blocks(np.array(read_exr(output))[..., :3])
     return Rendered(pixels, output.with_suffix(".png"), seconds)

@@ -1,12 +1,13 @@
 """Shared functions of the programs of this folder: parts of pages, JPEG, measurements, errors.
 
 Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end. Files that are
-missing, damaged or not writable are a DiffractionError, which `exit_code` prints in one line.
+missing, damaged or not writable are a DiffractionError, which a `program` prints in one line.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import json
 import os
@@ -16,9 +17,11 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
+from matplotlib.figure import Figure
 from PIL import Image
 
 from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.cli import main as command
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 
@@ -57,8 +60,7 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
             text = replaced(text, name, content)
         except DiffractionError as error:
             raise DiffractionError(f"'{file}': {error}") from error
-    with atomic_path(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(file, text)
 
 
 def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
@@ -88,6 +90,36 @@ def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     """A Markdown table."""
     lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_figure(path: Path, figure: Figure, dpi: float | None = None) -> None:
+    """Write a figure as PNG without the name of its software: equal figures are equal files.
+
+    dpi : of the picture; None is that of the figure.
+    """
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=dpi or "figure", metadata={"Software": None})
+
+
+def run(*words: object) -> None:
+    """Run a command of the package and say nothing, since it would name temporary files.
+
+    Raises
+    ------
+    DiffractionError
+        If the command fails, after its own message.
+    """
+    typed = [str(word) for word in words]
+    with contextlib.redirect_stdout(io.StringIO()):
+        code = command(typed)
+    if code != 0:
+        raise DiffractionError(f"'{' '.join(typed)}' failed; see above")
 
 
 def write_jpeg(
@@ -129,6 +161,14 @@ def option(*names: str, **how: Any) -> Option:
     return names, how
 
 
+def progress_option() -> Option:
+    """Return the option of programs with a progress bar."""
+    return option(
+        "--progress", action=argparse.BooleanOptionalAction, default=None,
+        help="show progress bars; by default on a terminal",
+    )  # fmt: skip
+
+
 def measured_options(what: str) -> tuple[Option, ...]:
     """Return the options that name a measured patch; `what` is the help of the first."""
     lengths = (("--pixel-size", "DX"), ("--max-height", "H"))
@@ -141,7 +181,8 @@ def measured_options(what: str) -> tuple[Option, ...]:
 def program(*options: Option) -> Callable[[Callable[[argparse.Namespace], None]], Main]:
     """Return a decorator that makes a function of parsed options the `main` of its module.
 
-    That returns 0, or 1 after an error, which is printed in one line; its help is the module's.
+    That returns 0, 130 if it was interrupted, or 1 after an error, which is printed in one line.
+    Its help is the module's.
     """
 
     def made(work: Callable[[argparse.Namespace], None]) -> Main:
@@ -155,7 +196,15 @@ def program(*options: Option) -> Callable[[Callable[[argparse.Namespace], None]]
             for names, how in options:
                 parser.add_argument(*names, **how)
             args = parser.parse_args(argv)
-            return exit_code(name.rpartition(".")[2], lambda: work(args))
+            try:
+                work(args)
+            except DiffractionError as error:
+                print(f"{name.rpartition('.')[2]}: error: {error}", file=sys.stderr)
+                return 1
+            except KeyboardInterrupt:
+                print("interrupted; no half-written file was left behind", file=sys.stderr)
+                return 130
+            return 0
 
         return main
 
@@ -183,13 +232,3 @@ def from_json(file: Path, make: Callable[[Any], Made], *, writer: str, remedy: s
         raise DiffractionError(
             f"'{file}' is not what {writer} writes ({error}); {remedy}"
         ) from error
-
-
-def exit_code(name: str, work: Callable[[], None]) -> int:
-    """Run `work` and return 0, or 1 after an error, which is printed in one line."""
-    try:
-        work()
-    except DiffractionError as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
-        return 1
-    return 0

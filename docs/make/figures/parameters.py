@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import mitsuba_diffraction
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
@@ -149,8 +148,7 @@ def _prose(text: str) -> str:
 )  # fmt: skip
 def main(args: argparse.Namespace) -> None:
     """Write the page."""
-    with atomic_path(args.output) as temporary:
-        temporary.write_text(page(), encoding="utf-8")
+    pages.write_text(args.output, page())
 
 
 if __name__ == "__main__":

@@ -13,8 +13,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from mitsuba_diffraction.cli import main as run_command
-from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.orders import OrderTable
 
 from . import pages
@@ -70,8 +68,7 @@ def main(args: argparse.Namespace) -> None:
         folder = Path(name)
         files = {kind: folder / f"{kind}.nc" for kind in ("efficiencies", "Mueller matrices")}
         for (_, file), option in zip(files.items(), ([], ["--polarised"]), strict=True):
-            if run_command([*COMMAND, *option, "-o", str(file)]):
-                raise DiffractionError(f"'{file.name}' cannot be solved; see above")
+            pages.run(*COMMAND, *option, "-o", file)
         table = OrderTable.load(files["Mueller matrices"])
         figure(table).savefig(folder / "figure.png", dpi=110)
         write_jpeg(folder / "figure.png", picture)

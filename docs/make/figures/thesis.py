@@ -20,7 +20,6 @@ from pathlib import Path
 
 from mitsuba_diffraction.analysis.maps.picture import contact_sheet
 from mitsuba_diffraction.analysis.maps.result import LightDirection
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
@@ -169,8 +168,7 @@ def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
             title=f"{patch.name}: {kind}",
             exposure=None if best is None else best.map.exposure(),
         )
-        with atomic_path(page.parent / "images" / f"sweep-{kind}.png") as path:
-            sheet.savefig(path, format="png")
+        pages.write_figure(page.parent / "images" / f"sweep-{kind}.png", sheet)
     pages.update(page, parts)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from mitsuba_diffraction.atomic import atomic_path
+from docs.make.figures.pages import write_text
 
 from . import predict
 from .grooves import Groove
@@ -208,5 +208,4 @@ def write_fits() -> None:
         for count, groove in case.fit().items() if not case.like else ():
             values = ",".join(f"{value:.2f}" for value in groove[:3])
             lines.append(f"{case.name.replace(',', ';')},{count},{values}")
-    with atomic_path(FITTED) as temporary:
-        temporary.write_text(header + "\n".join(lines) + "\n", encoding="utf-8")
+    write_text(FITTED, header + "\n".join(lines) + "\n")

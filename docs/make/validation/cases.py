@@ -36,8 +36,13 @@ PROBE_WAVELENGTHS = tuple(float(w) for w in range(450, 781, 30))
 #: Aluminium's index n + ik by wavelength (nm): Mitsuba's own table (material `Al`), interpolated.
 ALUMINIUM = {460.0: 0.646 + 5.590j, 610.0: 1.248 + 7.368j}
 
+#: Silicon's index by wavelength (nm): Mitsuba's own table (material `Si`), interpolated.
+SILICON = {460.0: 4.577 + 0.130j, 610.0: 3.906 + 0.022j}
+
 #: Keratin's index, the middle of what is reported for hair and scales (1.54–1.58).
 KERATIN = 1.56
+
+_METALS = {"aluminium": ALUMINIUM, "silicon": SILICON}
 
 #: Polycarbonate's index, the coat of a CD.
 COAT = 1.58
@@ -111,7 +116,14 @@ def index_of(material: str, wavelength: float) -> complex:
     """
     if material == "aluminium under polycarbonate":
         return ALUMINIUM[round(wavelength * COAT, 6)] / COAT
-    return KERATIN + 0j if material == "keratin" else ALUMINIUM[wavelength]
+    return KERATIN + 0j if material == "keratin" else _METALS[material][wavelength]
+
+
+def index_text(material: str) -> str:
+    """Return the index of a material in words, for files of solutions."""
+    if material not in _METALS:
+        return f"{KERATIN:g}" if material == "keratin" else "perfect conductor"
+    return ", ".join(f"{n:g} at {w:g} nm" for w, n in _METALS[material].items())
 
 
 def _scans(material: str) -> Iterator[Scan]:

@@ -53,7 +53,7 @@ class Comparison:
         return Comparison(self.material, part, self.model[keep], self.by_light[keep])
 
     def where(self, **values: Any) -> Comparison:
-        """The rows with these values, such as profile="lamellar" or theta=30.0."""
+        """The rows with these values, as `Solutions.where`."""
         return self.select(self.solutions.having(**values))
 
     def deviation(self, *, colours: bool = False, light: str | None = None) -> float:
@@ -91,11 +91,11 @@ def compare(
     material: str,
     solutions: Solutions | None = None,
     model: str = "kirchhoff",
-    coat: float | None = None,
+    **layer: Any,
 ) -> Comparison:
     """Evaluate a model (`model.MODELS`) for the converged solutions, by default the stored ones.
 
-    coat : index of a coat over the gratings; `by_light` is NaN then.
+    layer : over the gratings, `coat` or `film` of `reference.brdf`; `by_light` is NaN then.
 
     Raises
     ------
@@ -107,10 +107,10 @@ def compare(
     unpolarised, lights = np.full(len(rows), np.nan), np.full((len(rows), 2), np.nan)
     for grating, theta, wavelength, members in scans_of(rows):
         orders, _ = order_sines(grating.period, wavelength, theta)
-        efficiencies = order_efficiencies(grating, material, theta, wavelength, model, coat)
+        efficiencies = order_efficiencies(grating, material, theta, wavelength, model, **layer)
         place = np.searchsorted(orders, rows["order"][members])
         unpolarised[members] = efficiencies[place]
-        if coat is None:
+        if not layer:
             share = order_shares(grating, material, theta, wavelength, model)
             lights[members] = (efficiencies[:, None] * share)[place]
     return Comparison(material, trusted, unpolarised, lights)
@@ -153,9 +153,7 @@ def table_of(
     """A measure for each grating and angle, (gratings, angles); NaN where nothing was solved."""
     result = np.full((len(gratings), len(angles)), np.nan)
     for row, grating in enumerate(gratings):
-        of_grating = comparison.where(
-            profile=grating.profile, period=grating.period, depth=grating.depth
-        )
+        of_grating = comparison.where(grating=grating)
         for column, theta in enumerate(angles):
             part = of_grating.where(theta=theta)
             if len(part.model):

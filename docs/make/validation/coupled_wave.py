@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
-import importlib.util
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -17,10 +16,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from mitsuba_diffraction.errors import DiffractionError
-
 from .cases import Scan, index_of, order_sines
-from .solutions import Efficiencies
+from .solutions import Efficiencies, imported
+
+#: Package that solves.
+PACKAGE = "pySCATMECH"
 
 #: (highest Fourier order, layers of the staircase): first and finally.
 STAIRCASE = ((12, 40), (24, 80))
@@ -33,11 +33,6 @@ def name() -> str:
     return f"pySCATMECH {importlib.metadata.version('pySCATMECH')}, coupled waves"
 
 
-def available() -> bool:
-    """Whether pySCATMECH can be imported."""
-    return importlib.util.find_spec("pySCATMECH") is not None
-
-
 def can_solve(scan: Scan, polarisation: str) -> bool:
     """Whether coupled waves converge for this ("te" or "tm")."""
     if scan.material == "keratin":
@@ -47,15 +42,7 @@ def can_solve(scan: Scan, polarisation: str) -> bool:
 
 
 def part_of(scans: Sequence[Scan]) -> list[Scan]:
-    """The scans to compare both solvers with: shallow and deep, narrow and wide, one wavelength.
-
-    Raises
-    ------
-    DiffractionError
-        If they are of a perfect conductor, which has no index.
-    """
-    if any(scan.material == "perfect" for scan in scans):
-        raise DiffractionError("coupled waves need an index: solve 'aluminium' or 'keratin'")
+    """The scans to compare both solvers with: shallow and deep, narrow and wide, one wavelength."""
     return [
         replace(scan, wavelengths=scan.wavelengths[-1:])
         for scan in scans
@@ -82,17 +69,12 @@ def solve(scan: Scan, resolution: tuple[int, int]) -> Efficiencies:
     DiffractionError
         If pySCATMECH is not installed.
     """
-    try:
-        from pySCATMECH.rcw import RCW_Model
-    except ImportError as error:
-        raise DiffractionError(
-            "pySCATMECH is not installed; install the extra: pip install '.[validation]'"
-        ) from error
+    model_of = imported("pySCATMECH.rcw").RCW_Model
     result = Efficiencies(len(scan.wavelengths))
     for wavelength in scan.wavelengths:
         orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
         with _quiet():
-            model = RCW_Model(_parameters(scan, wavelength, resolution))
+            model = model_of(_parameters(scan, wavelength, resolution))
             matrices = np.array([np.array(model.DiffractionEfficiency(int(m))) for m in orders])
         # Mueller matrices: with grooves across the plane of incidence, s is TE
         for polarisation, sign in (("te", 1), ("tm", -1)):

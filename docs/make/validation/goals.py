@@ -202,8 +202,8 @@ def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Case]:
 def _case(
     models: Mapping[str, Comparison], label: str, theta: float, gratings: Sequence[Grating]
 ) -> Case:
-    parts = []
-    for grating in gratings:
-        chosen = {"profile": grating.profile, "period": grating.period, "depth": grating.depth}
-        parts.append({name: every.where(theta=theta, **chosen) for name, every in models.items()})
+    parts = [
+        {name: every.where(grating=grating, theta=theta) for name, every in models.items()}
+        for grating in gratings
+    ]
     return Case(label, theta, parts)

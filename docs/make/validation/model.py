@@ -16,6 +16,7 @@ R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffractio
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,7 +43,7 @@ def order_efficiencies(
     theta: float,
     wavelength: float,
     model: str = "kirchhoff",
-    coat: float | None = None,
+    **layer: Any,
 ) -> NDArray[np.float64]:
     """η_m of every propagating order, ordered as `cases.order_sines`, for unpolarised light.
 
@@ -53,13 +54,13 @@ def order_efficiencies(
     theta : angle of incidence, degrees.
     wavelength : nm.
     model : of `MODELS`.
-    coat : index of a coat over the grating, for models of `reference.MODELS`.
+    layer : `coat` or `film` of `reference.brdf`, for models of `reference.MODELS`.
     """
     _, sines = order_sines(grating.period, wavelength, theta)
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     index = None if material == "perfect" else index_of(material, wavelength)
     return efficiencies(
-        _period(grating), index, wi, wo, wavelength, model, sigma=LOBE_SIGMA, coat=coat
+        _period(grating), index, wi, wo, wavelength, model, sigma=LOBE_SIGMA, **layer
     )
 
 
@@ -72,7 +73,7 @@ def efficiencies(
     model: str,
     *,
     sigma: float,
-    coat: float | None = None,
+    **layer: Any,
 ) -> NDArray[np.float64]:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
@@ -90,7 +91,7 @@ def efficiencies(
     known = model if model in reference.MODELS else "kirchhoff"
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
-        coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
+        coherence_width=width, model=known, eta=index.real, k=index.imag, **layer,
     )  # fmt: skip
     if model == known:
         return brdf

@@ -1,5 +1,7 @@
 """Surfaces in two dimensions, for comparisons with rigorous solutions.
 
+    python -m docs.make.validation.patches FILE    # cut the measured scale, see data/
+
 Small periodic cells: conical mounts of a sinusoid, a crossed grating, and cuts
 of scales and of a CD. A cut is made periodic, smoothed and scaled to a given slope, so that it can
 be solved with a few hundred harmonics.
@@ -7,6 +9,8 @@ be solved with a few hundred harmonics.
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -16,10 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.figures.pages import option, program
 from mitsuba_diffraction import HeightField, gratings
 from mitsuba_diffraction.atomic import atomic_path
 
 from .cases import ALUMINIUM, KERATIN
+from .solutions import DATA
 
 KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
 #: Cuts of the measured patch; the project does not ship this patch.
@@ -154,7 +160,7 @@ def save_measured(cuts: dict[str, Cut], folder: Path) -> Path:
 @cache
 def _measured() -> dict[str, Cut]:
     """Cuts of the measured scale, from the file that is kept."""
-    with np.load(Path(__file__).parent / "data" / _MEASURED) as parts:
+    with np.load(DATA / _MEASURED) as parts:
         return {
             str(name): Cut(parts[f"heights_{n}"].astype(float), float(parts[f"side_{n}"]))
             for n, name in enumerate(parts["names"])
@@ -228,3 +234,19 @@ def _slope(heights: NDArray[np.float64], side: float) -> float:
     q = 2 * np.pi * np.fft.fftfreq(count, side / count)
     power = np.abs(np.fft.fft2(heights) / heights.size) ** 2
     return float(np.sqrt(np.sum(power * (q[None, :] ** 2 + q[:, None] ** 2))))
+
+
+@program(
+    option("patch", type=Path, help="the measured scale, in an image"),
+    option("--pixel-size", type=float, default=65 / 1332, metavar="MICROMETRES"),
+    option("--max-height", type=float, default=0.375, metavar="MICROMETRES"),
+    option("-o", "--output", metavar="FOLDER", type=Path, default=DATA),
+)
+def main(args: argparse.Namespace) -> None:
+    """Cut the measured scale."""
+    patch = HeightField.load(args.patch, pixel_size=args.pixel_size, max_height=args.max_height)
+    print(f"wrote {save_measured(measured_cuts(patch), args.output)}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

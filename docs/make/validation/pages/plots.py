@@ -68,9 +68,7 @@ def orders_figure(comparison: Comparison, gratings: list[Grating], theta: float)
     """Efficiencies of the strongest orders against wavelength: both polarisations and the model."""
     figure, axes = _figure(4.6 * len(gratings), 4.4, len(gratings))
     for panel, grating in zip(axes, gratings, strict=True):
-        part = comparison.where(
-            profile=grating.profile, period=grating.period, depth=grating.depth, theta=theta
-        )
+        part = comparison.where(grating=grating, theta=theta)
         rows = part.solutions.rows
         strongest = sorted(
             {int(m) for m in rows["order"]},
