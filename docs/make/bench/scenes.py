@@ -28,6 +28,8 @@ _GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
 AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
 #: Wavelengths of the light whose noise is measured, nm.
 WAVELENGTHS = (450.0, 550.0, 650.0)
+#: Columns of the noise of one sample over these.
+NOISE = ("least", "median", "most", "largest weight")
 #: Samples a pixel of the rendering in which bright pixels are looked for.
 FIREFLY_SPP = 64
 
@@ -166,31 +168,12 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Relative standard deviation of one sample's estimate of the directional albedo."""
     orders = tables.bsdf("default", material="none", energy_conserving=False)
     cosine = draws_by_cosine(tables.bsdf("default", material="none", energy_conserving=False))
-    columns = ("least", "median", "most", "largest weight", "by the cosine")
-    rows = []
+    columns, rows = (*NOISE, "by the cosine"), []
     for n, (theta, goal) in enumerate(_GOALS.items()):
         progress(n, len(_GOALS), "noise")
-        samples = [
-            deviation_of(orders, theta, phi, wavelength, plan.lanes)
-            for phi in AZIMUTHS
-            for wavelength in WAVELENGTHS
-        ]
-        deviations = [deviation for deviation, _ in samples]
-        values = (
-            min(deviations),
-            float(np.median(deviations)),
-            max(deviations),
-            max(weight for _, weight in samples),
-            deviation_of(cosine, theta, 0.0, 550.0, plan.lanes)[0],
-        )
-        rows.append(
-            Row(
-                f"{theta:g}°",
-                dict(zip(columns, values, strict=True)),
-                [Goal(f"at most {goal:g}", max(deviations) <= goal)],
-                {"standard deviations": deviations},
-            )
-        )
+        row = noise_row(f"{theta:g}°", orders, theta, goal, plan.lanes)
+        row.values[columns[-1]] = deviation_of(cosine, theta, 0.0, 550.0, plan.lanes)[0]
+        rows.append(row)
     progress(len(_GOALS), len(_GOALS), "noise")
     title = (
         "noise: relative standard deviation of one sample's albedo, R = 1, raw Kirchhoff, "
@@ -198,6 +181,23 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
         f"{WAVELENGTHS[0]:g} to {WAVELENGTHS[-1]:g} nm"
     )
     return Section(title, columns, rows)
+
+
+def noise_row(name: str, bsdf: Any, theta: float, most: float, lanes: int) -> Row:
+    """Return `NOISE` of a BSDF for light at an angle; `most` is the goal."""
+    samples = [
+        deviation_of(bsdf, theta, phi, wavelength, lanes)
+        for phi in AZIMUTHS
+        for wavelength in WAVELENGTHS
+    ]
+    deviations, weights = (list(column) for column in zip(*samples, strict=True))
+    values = (min(deviations), float(np.median(deviations)), max(deviations), max(weights))
+    return Row(
+        name,
+        dict(zip(NOISE, values, strict=True)),
+        [Goal(f"at most {most:g}", max(deviations) <= most)],
+        {"standard deviations": deviations},
+    )
 
 
 def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:

@@ -79,9 +79,9 @@ def compare(
             np.array(mi.render(scene, spp=mitsuba_samples // 2, seed=seed)) for seed in (0, 1)
         )
         depth = mi.render(scene, integrator=mi.load_dict({"type": "depth"}), spp=16)
-        covered = _blocks(np.array(depth)[..., :1] > 0.0, block)[..., 0] == 1.0
+        covered = blocks(np.array(depth)[..., :1] > 0.0, block)[..., 0] == 1.0
         means = [np.mean(pair, axis=0) for pair in (mitsuba, cycles)]
-        halves_of_blocks = [[_blocks(half, block) for half in pair] for pair in (mitsuba, cycles)]
+        halves_of_blocks = [[blocks(half, block) for half in pair] for pair in (mitsuba, cycles)]
         reference, other = (np.mean(pair, axis=0) for pair in halves_of_blocks)
         white = 1.0 / float(np.percentile(reference[covered].mean(axis=-1), 95.0))
         noise = [
@@ -93,7 +93,7 @@ def compare(
     return found
 
 
-def _blocks(picture: NDArray[Any], side: int) -> NDArray[np.float64]:
+def blocks(picture: NDArray[Any], side: int) -> NDArray[np.float64]:
     """Return the means over blocks of pixels; the rest at the right and below is left out."""
     rows, columns = (size // side for size in picture.shape[:2])
     cut = picture[: rows * side, : columns * side].astype(np.float64)

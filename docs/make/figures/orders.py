@@ -12,7 +12,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import mitsuba as mi
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from docs.make.blender.compare import blocks
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import natural
 from mitsuba_diffraction.scene.load import load_scene, set_variant
@@ -132,13 +132,6 @@ def row(scene: Scene, output: Path, folder: Path, flags: Sequence[str]) -> tuple
     )
 
 
-def _blocks(pixels: NDArray[Any]) -> NDArray[np.float32]:
-    """Return means over blocks of pixels, in which noise is below the differences."""
-    rows, columns = (size // _BLOCK for size in pixels.shape[:2])
-    cut = np.asarray(pixels, np.float32)[: rows * _BLOCK, : columns * _BLOCK]
-    return cut.reshape(rows, _BLOCK, columns, _BLOCK, -1).mean(axis=(1, 3))
-
-
 def _is_on(scene: Scene, flags: Sequence[str]) -> NDArray[np.bool_]:
     """Mask of the blocks whose corners the camera sees on the shape."""
     set_variant(None)
@@ -163,7 +156,7 @@ def _render(scene: Scene, output: Path, options: Sequence[str]) -> Rendered:
         start = time.process_time()
         pages.run("render", _file(scene), "-o", output, *options, *few)
         seconds = time.process_time() - start
-    pixels = _blocks(np.array(read_exr(output))[..., :3])
+    pixels = blocks(np.array(read_exr(output))[..., :3], _BLOCK)
     return Rendered(pixels, output.with_suffix(".png"), seconds)
 
 

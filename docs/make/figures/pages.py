@@ -35,20 +35,22 @@ _QUALITIES = (90, 86, 82, 78, 74, 70, 64, 58)
 
 def replaced(text: str, name: str, content: str) -> str:
     """Return the text with the part of that name replaced between its markers."""
-    begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
-    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
-        raise DiffractionError(f"expected '{begin}' and then '{end}', once each")
-    head, rest = text.split(begin)
-    tail = rest.split(end)[1]
-    return f"{head}{begin}\n{content.strip()}\n{end}{tail}"
+    head, _, tail = _split(text, name)
+    return f"{head}\n{content.strip()}\n{tail}"
 
 
 def part(text: str, name: str) -> str:
     """Return the text between the markers of that name."""
+    return _split(text, name)[1].strip()
+
+
+def _split(text: str, name: str) -> tuple[str, str, str]:
+    """Return what stands before, between and after the markers of that name, with the markers."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
-    if begin not in text or end not in text:
-        raise DiffractionError(f"expected '{begin}' and '{end}'")
-    return text.split(begin)[1].split(end)[0].strip()
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        raise DiffractionError(f"expected '{begin}' and then '{end}', once each")
+    first, last = text.index(begin) + len(begin), text.index(end)
+    return text[:first], text[first:last], text[last:]
 
 
 def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.validation.light import heights_of, light_of, powers_of
 from docs.make.validation.model import efficiencies, in_plane
-from docs.make.validation.published import light_of
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
@@ -17,8 +17,6 @@ from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile
 from mitsuba_diffraction.orders.solve.stations import Solver, Station
-
-from .grooves import heights_of
 
 Real = NDArray[np.float64]
 
@@ -51,8 +49,7 @@ def littrow_solved(solver: Solver, period: float, material: str, wavelengths: Re
     for lam in wavelengths:
         sine = 0.5e-3 * lam / period
         light = light_of(period, 1e-3 * lam, index_of(material, lam), sine, _ALONG)
-        powers = np.abs(solver.amplitudes(light.station)[0, light.channel]) ** 2
-        values.append(powers.mean(axis=0).sum(axis=-1)[light.channel + 1])
+        values.append(powers_of(solver, light)[-1].mean())
     return np.array(values)
 
 
@@ -74,8 +71,8 @@ def normal_pair(profile: Profile, material: str, wavelengths: Real) -> tuple[Rea
     for lam in wavelengths:
         index = index_of(material, lam)
         light = light_of(profile.period, 1e-3 * lam, index, 1e-9, _ALONG)
-        powers = np.abs(solver.amplitudes(light.station)[0, light.channel, 1]) ** 2
-        solved.append(powers[[light.channel - 1, light.channel + 1]].sum())
+        powers = powers_of(solver, light)
+        solved.append(powers[-1][1] + powers[1][1])
         wo = in_plane(1e-3 * lam / profile.period * np.array([-1.0, 1.0]))
         light_in = in_plane(0.0), wo, lam, _MODEL
         modelled.append(efficiencies(field, index, *light_in, sigma=profile.period).sum())

@@ -29,6 +29,7 @@ closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 orders           tables of solved orders, beside solvers that did not make them
 published        solvers beside printed efficiencies
+light            light on a grating, and its orders by a solver of the package
 scans            hues of gratings and crops of a rough surface, through windows
 tapers           width of lobes against colours, for tapers of these windows
 statistics       checks with random surfaces, and windows at random places

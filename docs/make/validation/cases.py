@@ -67,17 +67,13 @@ class Grating:
         DiffractionError
             If there is no such profile.
         """
-        lengths = (self.period, self.depth)
-        if self.profile == "sinusoidal":
-            return gratings.sinusoidal(*lengths, periods=1, pixels_per_period=pixels, rows=2)
-        if self.profile == "lamellar":
-            return gratings.lamellar(*lengths, periods=1, pixels_per_period=pixels, rows=2)
-        if self.profile == "blazed":
-            return gratings.blazed(
-                *lengths, direction="ascending", periods=1, pixels_per_period=pixels, rows=2
+        if self.profile not in PROFILES:
+            raise DiffractionError(
+                f"profile '{self.profile}' is unknown; choose one of {', '.join(PROFILES)}"
             )
-        raise DiffractionError(
-            f"profile '{self.profile}' is unknown; choose one of {', '.join(PROFILES)}"
+        ascends = {"direction": "ascending"} if self.profile == "blazed" else {}
+        return getattr(gratings, self.profile)(
+            self.period, self.depth, periods=1, pixels_per_period=pixels, rows=2, **ascends
         )
 
     def __str__(self) -> str:

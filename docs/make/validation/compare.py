@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .cases import PROFILES, Grating, order_sines
 from .model import order_efficiencies, order_shares
-from .solutions import KEY, Solutions, shipped
+from .solutions import KEY, LIGHTS, Solutions, shipped
 
 #: Orders that leave closer to the surface than this are not counted: the model has no limit there.
 GRAZING = 75.0  # degrees
@@ -65,10 +65,9 @@ class Comparison:
         keep = self.counted & (self.solutions.rows["order"] != 0) if colours else self.counted
         model, exact = self.model, self.rigorous
         if light is not None:
-            model = self.by_light[:, ("te", "tm").index(light)]
+            model = self.by_light[:, LIGHTS.index(light)]
             exact = self.solutions.rows[light].astype(float)
-        total = float(exact[keep].sum())
-        return float(np.abs(model - exact)[keep].sum()) / total if total else np.nan
+        return misplaced(model, exact, keep)
 
     def change(self) -> float:
         """Change by the last refinement of the solver, in the measure of `deviation` of colours."""
@@ -85,6 +84,16 @@ class Comparison:
     def gain(self) -> float:
         """Σ η / Σ η_rigorous over all rows: how much light the model makes or loses altogether."""
         return float(self.model.sum() / self.rigorous.sum())
+
+
+def misplaced(
+    values: NDArray[np.float64],
+    exact: NDArray[np.float64],
+    keep: NDArray[np.bool_] | slice = slice(None),
+) -> float:
+    """Return Σ|values − exact| / Σ exact over the rows that are kept; NaN without light in them."""
+    total = float(exact[keep].sum())
+    return float(np.abs(values - exact)[keep].sum()) / total if total else np.nan
 
 
 def compare(

@@ -20,6 +20,7 @@ from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.reference import boundary
 
 from . import crossed, rayleigh
+from .light import direction
 from .patches import SURFACES, PatchCase, cell, patch_cases, patch_index
 from .solutions import DATA, Work, load_rows
 
@@ -61,9 +62,7 @@ class Solved:
     @property
     def wi(self) -> NDArray[np.float64]:
         """Unit vector to the light, (3,)."""
-        theta, phi = np.radians([self.case.theta, self.case.phi])
-        sine = np.sin(theta)
-        return np.array([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)])
+        return direction(self.case.theta, self.case.phi)
 
     def wo(self, field: HeightField) -> NDArray[np.float64]:
         """Directions of the orders, (n, 3)."""

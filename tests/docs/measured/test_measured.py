@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from docs.make.measured import cases, predict
-from docs.make.measured.grooves import Groove, heights_of
+from docs.make.measured.grooves import Groove
+from docs.make.validation.light import heights_of
 
 pytest.importorskip("gratinglab")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -26,6 +26,11 @@ def percent(value: float) -> str:
 def angle(degrees: float) -> str:
     """An angle in degrees, with a true minus sign."""
     return f"{degrees:g}°".replace("-", "−")
+
+
+def beside(*columns: Iterable[float]) -> list[str]:
+    """Cells with the numbers of several columns in per cent: 1 % / 2 %."""
+    return [" / ".join(map(percent, values)) for values in zip(*columns, strict=True)]
 
 
 def joined(values: Sequence[float]) -> str:
