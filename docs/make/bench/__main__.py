@@ -36,6 +36,16 @@ PARTS = (
 )  # fmt: skip
 
 
+def _check_scenes(folder: Path) -> None:
+    """Refuse a folder without the project's scenes, before anything is measured."""
+    if not (folder / "snake.xml").is_file():
+        raise DiffractionError(
+            f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
+            "with --scenes, or measure a part without them: --only build, eval, sample, noise or "
+            "update"
+        )
+
+
 @program(
     option("--quick", action="store_true", help="fewer, smaller and shorter runs"),
     option("--json", metavar="FILE", type=Path, help="write every single measurement"),
@@ -86,17 +96,3 @@ def main(args: argparse.Namespace) -> None:
         print("\n".join(figures.compared(earlier, data)))
     if args.json is not None:
         save_json(args.json, data)
-
-
-def _check_scenes(folder: Path) -> None:
-    """Refuse a folder without the project's scenes, before anything is measured."""
-    if not (folder / "snake.xml").is_file():
-        raise DiffractionError(
-            f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
-            "with --scenes, or measure a part without them: --only build, eval, sample, noise or "
-            "update"
-        )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

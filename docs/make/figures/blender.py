@@ -6,7 +6,6 @@ python -m docs.make.figures.blender [-o docs] [--quick] [--samples N] [PART ...]
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -182,7 +181,3 @@ def main(args: argparse.Namespace) -> None:
         pages.update(page, {"noise": noise(work_folders[1])})
     if "showcase" in parts:
         showcase(images / "showcase.jpg", 16 if args.quick else args.samples)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

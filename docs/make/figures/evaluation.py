@@ -9,7 +9,6 @@ The picture goes to `images/evaluation.png` beside the page, the numbers between
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -182,7 +181,3 @@ def main(args: argparse.Namespace) -> None:
     pages.update(args.output, {"periods": period_table(results)})
     picture = args.output.parent / "images" / "evaluation.png"
     pages.write_figure(picture, evaluation_figure(results))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ python -m docs.make.figures.geometry -o docs/images/geometry.png
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +110,3 @@ def _above(axes: Axes) -> None:
 def main(args: argparse.Namespace) -> None:
     """Draw the picture."""
     write_figure(args.output, figure())
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -141,7 +140,3 @@ def main(args: argparse.Namespace) -> None:
     for name, made in PAGES.items():
         pages.write_text(args.output / name, made())
         print(f"wrote {args.output / name}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,7 +9,6 @@ import argparse
 import csv
 import io
 import re
-import sys
 from pathlib import Path
 
 from .pages import option, program, write_text
@@ -84,7 +83,3 @@ def main(args: argparse.Namespace) -> None:
         if separated(text := page.read_text(encoding="utf-8"), page.stem)[1]:
             for path in write_page(page, text):
                 print(f"wrote {path}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ python -m docs.make.figures.orders [--quick] [--only cd]
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -206,7 +205,3 @@ def main(args: argparse.Namespace) -> None:
     if args.only is None:
         page = "\n\n".join([*shown, pages.table(_HEADER, rows), _HOW.format(_BLOCK)])
         pages.update(args.output / "orders.md", {"orders": page})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

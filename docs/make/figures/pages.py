@@ -184,7 +184,8 @@ def program(*options: Option) -> Callable[[Callable[[argparse.Namespace], None]]
     """Return a decorator that makes a function of parsed options the `main` of its module.
 
     That returns 0, 130 if it was interrupted, or 1 after an error, which is printed in one line.
-    Its help is the module's.
+    Its help is the module's. A module that is run as a program exits with it here: it has to be the
+    module's last function.
     """
 
     def made(work: Callable[[argparse.Namespace], None]) -> Main:
@@ -208,6 +209,8 @@ def program(*options: Option) -> Callable[[Callable[[argparse.Namespace], None]]
                 return 130
             return 0
 
+        if work.__module__ == "__main__":
+            sys.exit(main())
         return main
 
     return made

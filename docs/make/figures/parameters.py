@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import ast
 import re
-import sys
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -149,7 +148,3 @@ def _prose(text: str) -> str:
 def main(args: argparse.Namespace) -> None:
     """Write the page."""
     pages.write_text(args.output, page())
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 import time
 import warnings
@@ -142,7 +141,3 @@ def main(args: argparse.Namespace) -> None:
         start = time.perf_counter()
         FIGURES[name](args)
         print(f"{name}: {time.perf_counter() - start:.1f} s")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ python -m docs.make.figures.polarised
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
@@ -80,7 +79,3 @@ def main(args: argparse.Namespace) -> None:
     text = f"{caption}\n\n![efficiency and polarisation](images/orders/{_NAME}.jpg)\n\n{cost}"
     text += "\n\n`python -m docs.make.figures.polarised` makes the figure and the table."
     pages.update(args.output / "orders.md", {_NAME: text})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

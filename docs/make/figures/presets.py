@@ -6,7 +6,6 @@ python -m docs.make.figures.presets -o docs
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
@@ -53,7 +52,3 @@ def main(args: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         picture = draw(Path(folder), args.samples)
         write_jpeg(picture, args.output / PICTURE, most=_MOST)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ python -m docs.make.figures.sheets
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -85,7 +84,3 @@ def main(args: argparse.Namespace) -> None:
     text = pages.table(header, [row(case) for case in CASES])
     text += "\n\n`python -m docs.make.figures.sheets` makes this table."
     pages.update(args.output / "orders.md", {"sheets": text})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ python -m docs.make.figures.solved
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from mitsuba_diffraction import OrderTable
@@ -48,7 +47,3 @@ def text() -> str:
 def main(args: argparse.Namespace) -> None:
     """Write the table."""
     pages.update(args.output / "orders.md", {"solved": text()})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import shutil
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -280,6 +279,11 @@ PARTS = {
 _LONG = ("tradeoff", "energy")
 
 
+def _rows_of(table: str) -> str:
+    """A table without its head."""
+    return table.split("\n", 2)[2]
+
+
 @program(
     option("part", choices=tuple(PARTS)),
     option("measured", metavar="FILE", type=Path, nargs="+", help="JSON, or a folder"),
@@ -307,12 +311,3 @@ def main(args: argparse.Namespace) -> None:
     for name in part.pictures:
         with atomic_path(args.images / name) as temporary:
             shutil.copyfile(args.measured[0] / name, temporary)
-
-
-def _rows_of(table: str) -> str:
-    """A table without its head."""
-    return table.split("\n", 2)[2]
-
-
-if __name__ == "__main__":
-    sys.exit(main())

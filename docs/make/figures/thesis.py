@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -190,7 +189,3 @@ def main(args: argparse.Namespace) -> None:
         # how far the model holds is not the question here
         warnings.simplefilter("ignore", DiffractionWarning)
         PROGRAMS[args.page](args, patch)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

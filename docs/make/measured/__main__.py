@@ -8,7 +8,6 @@ python -m docs.make.measured -o docs --kaist FOLDER   # with the maps of another
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from docs.make.figures.long_tables import write_page
@@ -42,7 +41,3 @@ def main(args: argparse.Namespace) -> None:
     write_figure(picture, page.figure(found), 100)
     write_page(written, page.write(found) + "\n")
     print(f"wrote {written}\nREADME: {page.summary(found)}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

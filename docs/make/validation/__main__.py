@@ -7,7 +7,6 @@ python -m docs.make.validation gratings      # one page of docs/validation/
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from mitsuba_diffraction.cli import Bar, check_outputs
@@ -33,7 +32,3 @@ def main(args: argparse.Namespace) -> None:
     with Bar(args) as bar:
         paths = write_report(args.output, names, quick=args.quick, progress=bar)
     print("\n".join(f"wrote {path}" for path in paths))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

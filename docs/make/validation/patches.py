@@ -10,7 +10,6 @@ be solved with a few hundred harmonics.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -246,7 +245,3 @@ def main(args: argparse.Namespace) -> None:
     """Cut the measured scale."""
     patch = HeightField.load(args.patch, pixel_size=args.pixel_size, max_height=args.max_height)
     print(f"wrote {save_measured(measured_cuts(patch), args.output)}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -14,7 +14,6 @@ import datetime
 import itertools
 import multiprocessing
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -133,7 +132,7 @@ def _jobs(text: str) -> int:
 
 
 @program(
-    option("name", choices=tuple(WORKS), help="of the files, or of a group of them"),
+    option("name", metavar="NAME", choices=tuple(WORKS), help=f"one of {', '.join(WORKS)}"),
     option("-o", "--output", metavar="FOLDER", type=Path, default=DATA),
     option("-j", "--jobs", metavar="N", type=_jobs, help="processes; all processors"),
     progress_option(),
@@ -162,7 +161,3 @@ def main(args: argparse.Namespace) -> None:
         every = np.concatenate(rows[file])
         save_rows(every, made | work.about[file], path)
         print(f"wrote {path}: {len(every)} orders")
-
-
-if __name__ == "__main__":
-    sys.exit(main())
