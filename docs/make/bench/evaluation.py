@@ -18,14 +18,13 @@ from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.timing import (
     Queries,
     kernel_operations,
-    kernel_seconds,
     kernel_time,
     ratio,
     rounds_of,
     vector_lanes,
 )
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
-from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.progress import Progress, silent
 from mitsuba_diffraction.tables.colour.table import ColourTable
 
 from .contenders import (
@@ -37,11 +36,11 @@ from .contenders import (
     KIRCHHOFF_AL,
     ON_SURFACE,
     ONE_WINDOW,
+    SLOW,
     THESIS,
     Tables,
     bare_gathers,
     bsdf_factories,
-    is_slow,
 )
 from .figures import Goal, Plan, Row, Section
 from .scenes import pigment, rays, snake
@@ -76,7 +75,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
     lanes: dict[str, int] = {}
     for name, make in bsdf_factories(tables).items():
         bsdf = make()
-        asked = queries[is_slow(name)]
+        asked = queries[name in SLOW]
         lanes[name] = len(asked.sample1)
         calls[name] = partial(bsdf.eval, context, asked.si, asked.wo)
         if name == DEFAULT:
@@ -204,14 +203,13 @@ def timed_section(title: str, timed: Timed, goals: Mapping[str, Sequence[Goal]])
     return Section(title, (_TIMES, _CPU, *baselines, _OPERATIONS), rows)
 
 
-def measure_colours(
-    plan: Plan, tables: Tables, scenes: Path, backend: str, progress: Progress
-) -> list[Section]:
-    """Differences between the RGB and the spectral variant, then size, time and speed.
+def measure_colours(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> list[Section]:
+    """Differences between the RGB variant and the spectral one that is set; size, time and speed.
 
     Leaves the spectral variant set.
     """
-    rgb, spectral = f"{backend}_ad_rgb", f"{backend}_ad_spectral"
+    spectral = mi.variant()
+    rgb = spectral.replace("spectral", "rgb")
     rows = []
     total = len(MATERIALS) + 2
     for n, (name, (parameters, strict)) in enumerate(MATERIALS.items()):
@@ -303,18 +301,13 @@ def _cost(plan: Plan, tables: Tables, rgb: str, spectral: str) -> Section:
     start = time.perf_counter()
     table = ColourTable.build(tables.load("default"))
     built = time.perf_counter() - start
-    calls: dict[str, list[float]] = {}
+    nanoseconds = {}
     for variant in (rgb, spectral):
         mi.set_variant(variant)
-        bsdf = tables.bsdf("default")
-        queries = Queries.random(plan.lanes)
+        bsdf, queries = tables.bsdf("default"), Queries.random(plan.lanes)
         call = partial(bsdf.eval, mi.BSDFContext(), queries.si, queries.wo)
-        calls |= rounds_of(
-            {variant: partial(kernel_seconds, call)}, plan.rounds, lambda done, total: None
-        )
-    nanoseconds = {
-        variant: 1e9 * statistics.median(taken) / plan.lanes for variant, taken in calls.items()
-    }
+        timed = time_calls(plan, {variant: call}, "colours", silent)
+        nanoseconds[variant] = statistics.median(timed.clock[variant])
     times = nanoseconds[rgb] / nanoseconds[spectral]
     megabytes = table.nbytes / 1e6
     columns = ("MB", "s to build", "eval, ns/call", "× spectral")

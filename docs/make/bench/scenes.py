@@ -14,7 +14,7 @@ import numpy as np
 
 from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.timing import SEED
-from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.plugin.power import PowerModel
 from mitsuba_diffraction.plugin.sampling import EVEN
 from mitsuba_diffraction.progress import Progress
@@ -49,21 +49,20 @@ def furnace(bsdf: Any, resolution: int) -> Any:
     )
 
 
-def window() -> dict[str, Any]:
-    """A dim sky, dark ground, and a bright window of 20 × 20 degrees."""
-    return {
-        "light": {
-            "type": "envmap",
-            "bitmap": mi.Bitmap(_window_map()),
-            "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], 90),
-        }
-    }
+def window(rows: int = 128) -> dict[str, Any]:
+    """A dim sky, dark ground, and a bright window of 20 × 20 degrees; `rows` of the map."""
+    light = np.full((rows, 2 * rows, 3), 0.5, np.float32)
+    light[rows // 2 :] = 0.05
+    degree = rows / 180.0
+    top, left = int(35 * degree), int(200 * degree)
+    light[top : top + int(20 * degree), left : left + int(20 * degree)] = 30.0
+    turned = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
+    return {"light": {"type": "envmap", "bitmap": mi.Bitmap(light), "to_world": turned}}
 
 
 def pigment(scenes: Path) -> dict[str, Any]:
     """The snake's own colours, to lie beneath the diffracting surface."""
     file = scenes / "textures" / "elaphe.png"
-    _check_there(file)
     scale = mi.ScalarTransform4f().scale([0.05, 1.0, 1.0])
     return {
         "type": "diffuse",
@@ -74,7 +73,6 @@ def pigment(scenes: Path) -> dict[str, Any]:
 def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any]) -> Any:
     """The coiled snake without the ground."""
     mesh = scenes / "meshes" / "elaphe.ply"
-    _check_there(mesh)
     above = mi.ScalarTransform4f().look_at(
         origin=[2.3, -32, 26], target=[1.4, -0.7, 0.6], up=[0, 0, 1]
     )
@@ -94,7 +92,6 @@ def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any
 def snake_scene(scenes: Path, table: Path, **parameters: str) -> Any:
     """`snake.xml` with a table, without warnings of how far the model holds for it."""
     file = scenes / "snake.xml"
-    _check_there(file)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         return mi.load_file(str(file), patch=str(table), **parameters)
@@ -127,14 +124,6 @@ def rays(scene: Any, side: int) -> tuple[int, Any]:
     return width * height, sensor.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))[0]
 
 
-def _check_there(file: Path) -> None:
-    if not file.is_file():
-        raise DiffractionError(
-            f"'{file}' does not exist; run this where the project's scenes are, or name their "
-            "folder with --scenes"
-        )
-
-
 def _frame(to_world: Any, width: int, height: int) -> dict[str, Any]:
     return {
         "type": "scene",
@@ -152,16 +141,6 @@ def _frame(to_world: Any, width: int, height: int) -> dict[str, Any]:
             "sampler": {"type": "independent"},
         },
     }
-
-
-def _window_map(rows: int = 128) -> np.ndarray[Any, np.dtype[np.float32]]:
-    """Latitude-longitude map (rows, 2 rows, 3) of the `window`."""
-    light = np.full((rows, 2 * rows, 3), 0.5, np.float32)
-    light[rows // 2 :] = 0.05
-    degree = rows / 180.0
-    top, left = int(35 * degree), int(200 * degree)
-    light[top : top + int(20 * degree), left : left + int(20 * degree)] = 30.0
-    return light
 
 
 def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:

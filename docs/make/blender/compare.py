@@ -36,7 +36,6 @@ class Comparison:
     noise : mean ΔE2000 that two such pictures of the same light would have.
     noise_of_cycles : the part of Cycles' picture in it.
     seconds : of Cycles, for all samples.
-    covered : blocks that the shape covers.
     """
 
     mitsuba: Picture
@@ -45,7 +44,6 @@ class Comparison:
     noise: float
     noise_of_cycles: float
     seconds: Seconds
-    covered: NDArray[np.bool_]
 
     @property
     def beyond_noise(self) -> float:
@@ -89,7 +87,7 @@ def compare(
         ]  # the mean of two halves has half the noise of their difference
         difference = _mean_delta_e(reference, other, white, covered)
         whole = math.hypot(*noise)
-        found.append(Comparison(*means, difference, whole, noise[1], time, covered))
+        found.append(Comparison(*means, difference, whole, noise[1], time))
     return found
 
 

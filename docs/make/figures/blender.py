@@ -19,6 +19,7 @@ from docs.make.blender.compare import Comparison, compare
 from docs.make.blender.program import run_in_blender, seconds
 from docs.make.blender.views import LIGHTS, Surface, View
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.optics.colour import encode_srgb
 
 from . import pages
 from .pages import option, program
@@ -133,9 +134,7 @@ def side_by_side(compared: Sequence[Comparison], target: Path) -> None:
     for comparison in compared:
         both = np.concatenate([comparison.mitsuba, comparison.cycles])
         shown = np.clip(both / np.percentile(both.mean(axis=-1), 97.0), 0.0, 1.0)
-        columns.append(
-            np.where(shown < 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
-        )
+        columns.append(encode_srgb(shown))
     image = Image.fromarray((255.0 * np.concatenate(columns, axis=1) + 0.5).astype(np.uint8))
     file = _FOLDER / "side_by_side.png"
     image.resize((4 * image.width, 4 * image.height), Image.Resampling.NEAREST).save(file)

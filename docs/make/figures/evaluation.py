@@ -68,14 +68,6 @@ class Periods:
     thesis: float  # period that the procedure of the thesis finds; NaN if none
 
 
-def exact_gratings() -> list[tuple[HeightField, float | None]]:
-    """Gratings with their nominal periods."""
-    return [
-        (blazed(2.5, 0.25, pixels_per_period=60, rows=2), 2.5),
-        (sinusoidal(1.6, 0.1, rows=2), 1.6),
-    ]
-
-
 def evaluate_patch(
     patch: HeightField,
     nominal: float | None,
@@ -162,7 +154,11 @@ def period_table(patches: Sequence[Periods]) -> str:
 )
 def main(args: argparse.Namespace) -> None:
     """Make the picture and the tables."""
-    patches = exact_gratings()
+    # with the periods that they are made with
+    patches: list[tuple[HeightField, float | None]] = [
+        (blazed(2.5, 0.25, pixels_per_period=60, rows=2), 2.5),
+        (sinusoidal(1.6, 0.1, rows=2), 1.6),
+    ]
     measured = measured_patch(args)
     if measured is not None:
         patches.append((measured, None))

@@ -41,13 +41,20 @@ def commands_page() -> str:
     ]
     for title, names in {**GROUPS, **({"More": tuple(left)} if left else {})}.items():
         rows = [
-            (f"`{name}`", _arguments(parsers[name][0]), _sentence(parsers[name][1]))
+            (
+                f"`{name}`",
+                _arguments(parsers[name][0]),
+                parsers[name][1][:1].upper() + parsers[name][1][1:],
+            )
             for name in names
             if name in parsers
         ]
         sections += [f"## {title}", pages.table(("command", "arguments", "what it does"), rows)]
     rows = [
-        (f"`--{name.replace('_', '-')} {each.metavar}`", _cell(each.help))
+        (
+            f"`--{name.replace('_', '-')} {each.metavar}`",
+            each.help.replace("|", r"\|").replace("%%", "%"),
+        )
         for name, each in OPTIONS.items()
     ]
     sections += [
@@ -84,14 +91,6 @@ def _arguments(parser: argparse.ArgumentParser) -> str:
         elif "-o" in action.option_strings:
             shown.append(f"-o {action.metavar or ''}".strip())
     return f"`{' '.join(shown)}`" if shown else ""
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", r"\|").replace("%%", "%")
 
 
 def python_page() -> str:

@@ -15,15 +15,17 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-from matplotlib.figure import Figure
 from PIL import Image
 
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.cli import main as command
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
+
+if TYPE_CHECKING:  # Matplotlib would be a part of what the bench measures
+    from matplotlib.figure import Figure
 
 Made = TypeVar("Made")
 Option: TypeAlias = tuple[tuple[str, ...], dict[str, Any]]
@@ -67,8 +69,7 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
 
 def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
     """Replace the parts that a file has markers for."""
-    text = _read(Path(path))
-    present = {name: part for name, part in parts.items() if f"<!-- begin {name} -->" in text}
+    present = {name: parts[name] for name in markers(path) if name in parts}
     if not present:
         raise DiffractionError(
             f"'{path}' has none of the markers {', '.join(f'<!-- begin {n} -->' for n in parts)}"
@@ -88,10 +89,11 @@ def _read(file: Path) -> str:
         raise DiffractionError(f"cannot read '{file}': {error.strerror}") from error
 
 
-def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+def table(header: Sequence[str], rows: Sequence[Sequence[object]], *, right: bool = False) -> str:
+    """A Markdown table; `right` aligns all columns but the first to the right."""
+    head, *body = ("| " + " | ".join(map(str, row)) + " |" for row in (header, *rows))
+    rule = "| --- |" + " ---: |" * (len(header) - 1) if right else "|" + "---|" * len(header)
+    return "\n".join([head, rule, *body])
 
 
 def write_text(path: Path, text: str) -> None:

@@ -279,11 +279,6 @@ PARTS = {
 _LONG = ("tradeoff", "energy")
 
 
-def _rows_of(table: str) -> str:
-    """A table without its head."""
-    return table.split("\n", 2)[2]
-
-
 @program(
     option("part", choices=tuple(PARTS)),
     option("measured", metavar="FILE", type=Path, nargs="+", help="JSON, or a folder"),
@@ -303,7 +298,8 @@ def main(args: argparse.Namespace) -> None:
             file, partial(part.tables, name=file.stem), writer=part.writer, remedy=part.remedy
         )
         for name, text in parts.items():  # a table goes on with the rows of the next file
-            texts[name] = f"{texts[name]}\n{_rows_of(text)}" if name in texts else text
+            rows = text.split("\n", 2)[-1]
+            texts[name] = f"{texts[name]}\n{rows}" if name in texts else text
     for page in args.output or map(Path, part.pages):
         pages.update_present(page, texts)
         if args.part in _LONG:

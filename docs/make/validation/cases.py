@@ -106,13 +106,16 @@ def scans(material: str) -> list[Scan]:
 
 
 def index_of(material: str, wavelength: float) -> complex:
-    """Index n + ik of a material at a wavelength (nm) of its scans.
+    """Index n + ik of a material at a wavelength (nm).
 
     Under polycarbonate both are those inside: the index is over the coat's.
     """
     if material == "aluminium under polycarbonate":
-        return ALUMINIUM[round(wavelength * COAT, 6)] / COAT
-    return KERATIN + 0j if material == "keratin" else _METALS[material][wavelength]
+        return index_of("aluminium", wavelength * COAT) / COAT
+    if material == "keratin":
+        return complex(KERATIN)
+    nodes = _METALS[material]  # Mitsuba's tables are smooth between them
+    return complex(np.interp(wavelength, list(nodes), list(nodes.values())))
 
 
 def index_text(material: str) -> str:

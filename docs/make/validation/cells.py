@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .cases import index_of
 from .compare import GRAZING, misplaced
 from .model import efficiencies, jones_of, shares
 from .patch_solutions import Solved, solved
-from .patches import KINDS, PatchCase, cell, patch_index
+from .patches import KINDS, PatchCase, cell
 
 _MODELS = ("kirchhoff", "small_slope_alone", "small_slope")
 _POLARISED = ("kirchhoff", "small_slope")
@@ -94,7 +95,7 @@ def _numbers(solution: Solved) -> list[tuple[int, int]]:
 def _compare(solution: Solved) -> PatchComparison:
     case, field = solution.case, cell(solution.case.surface)
     wi, wo = solution.wi, solution.wo(field)
-    index = patch_index(case.material, case.wavelength)
+    index = index_of(case.material, case.wavelength)
     coloured = (solution.rows["mx"] != 0) | (solution.rows["my"] != 0)
     keep = coloured & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
     truth = solution.efficiency(field)[keep]

@@ -7,20 +7,15 @@ for TM on a metallic staircase it does not, so that is not asked of it.
 
 from __future__ import annotations
 
-import contextlib
-import importlib.metadata
-import os
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from .cases import Scan, index_of, order_sines
-from .solutions import Efficiencies, imported
+from mitsuba_diffraction.streams import own_program, without_chatter
 
-#: Package that solves.
-PACKAGE = "pySCATMECH"
+from .cases import Scan, index_of, order_sines
+from .solutions import Efficiencies, imported, version
 
 #: (highest Fourier order, layers of the staircase): first and finally.
 STAIRCASE = ((12, 40), (24, 80))
@@ -30,7 +25,7 @@ LAMELLAR = ((60, 1), (120, 1))
 
 def name() -> str:
     """The solver's name and version."""
-    return f"pySCATMECH {importlib.metadata.version('pySCATMECH')}, coupled waves"
+    return f"pySCATMECH {version('pySCATMECH')}, coupled waves"
 
 
 def can_solve(scan: Scan, polarisation: str) -> bool:
@@ -73,7 +68,7 @@ def solve(scan: Scan, resolution: tuple[int, int]) -> Efficiencies:
     result = Efficiencies(len(scan.wavelengths))
     for wavelength in scan.wavelengths:
         orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
-        with _quiet():
+        with own_program(), without_chatter():  # it reports every layer
             model = model_of(_parameters(scan, wavelength, resolution))
             matrices = np.array([np.array(model.DiffractionEfficiency(int(m))) for m in orders])
         # Mueller matrices: with grooves across the plane of incidence, s is TE
@@ -120,17 +115,3 @@ _KINDS = {
     "lamellar": "Single_Line_Grating",
     "blazed": "Triangular_Grating",
 }
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """The library reports every layer on stderr, past Python's own stream."""
-    sys.stderr.flush()
-    stderr = os.dup(2)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        yield
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)

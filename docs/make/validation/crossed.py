@@ -9,7 +9,6 @@ the square of the layers' thickness; and the harmonics are those nearest to the 
 
 from __future__ import annotations
 
-import importlib.metadata
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.reference import boundary
 
-from .solutions import imported
+from .solutions import imported, version
 
 #: Orders closer to the horizon than this cosine are not returned.
 HORIZON = 0.01
@@ -45,7 +44,7 @@ class Orders:
 
 def name() -> str:
     """The solver's name and version."""
-    return f"grcwa {importlib.metadata.version('grcwa')}, coupled waves"
+    return f"grcwa {version('grcwa')}, coupled waves"
 
 
 def solve(

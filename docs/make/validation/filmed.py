@@ -163,7 +163,7 @@ class FilmDeviations(NamedTuple):
     default: Real
 
 
-def compare_models(stack: Stack) -> FilmDeviations:
+def of_stack(stack: Stack) -> FilmDeviations:
     """Compare both models with the stored solutions of a film."""
     return FilmDeviations(stack, deviations(stack, "kirchhoff"), deviations(stack, "small_slope"))
 

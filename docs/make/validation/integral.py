@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
 from .cases import Grating, Scan, index_of, order_sines
-from .solutions import LIGHTS, Efficiencies, imported
-
-#: Package that solves.
-PACKAGE = "gratinglab"
+from .solutions import LIGHTS, Efficiencies, imported, version
 
 #: Points on the boundary that a solution begins with, at least.
 POINTS = 200
@@ -28,7 +25,7 @@ _POINTS_PER_WAVELENGTH = 7
 
 def name() -> str:
     """The solver's name and version."""
-    return f"gratinglab {importlib.metadata.version('gratinglab')}, integral method"
+    return f"gratinglab {version('gratinglab')}, integral method"
 
 
 def solve(scan: Scan, boundary_points: int) -> Efficiencies:
@@ -119,14 +116,7 @@ def _material(scan: Scan) -> Iterator[str | None]:
         1 - np.pad(index.real, 1, mode="edge"),
         np.pad(index.imag, 1, mode="edge"),
     )
-    before = os.environ.get(materials.LIBRARY_ENV)
     with tempfile.TemporaryDirectory() as folder:
         materials.write_ari(table, Path(folder) / f"{scan.material}.ari")
-        os.environ[materials.LIBRARY_ENV] = folder
-        try:
+        with mock.patch.dict(os.environ, {materials.LIBRARY_ENV: folder}):
             yield scan.material
-        finally:
-            if before is None:
-                del os.environ[materials.LIBRARY_ENV]
-            else:
-                os.environ[materials.LIBRARY_ENV] = before

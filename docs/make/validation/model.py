@@ -27,7 +27,7 @@ from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.reference import boundary
 from mitsuba_diffraction.reference import model as models
 
-from .cases import PIXELS, Grating, index_of, order_sines
+from .cases import Grating, index_of, order_sines
 
 #: σ (µm) of a window through which the lobes of gratings are separate, up to periods of 1 mm, and
 #: order 0's lies above the horizon: √(kσ) cosθ is above 20 up to 75°, so C of eq. 10 is 1.
@@ -156,29 +156,6 @@ def order_shares(
     index, field = index_of(material, wavelength), grating.heights()
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     return shares(jones_of(field, index, wi, wo, wavelength, model))
-
-
-def lobe_peaks(
-    grating: Grating,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    wavelength: float,
-    pixels: int = PIXELS,
-) -> NDArray[np.float64]:
-    """The BRDF (R = 1) at the centres of lobes, through a window of `LOBE_SIGMA`.
-
-    Parameters
-    ----------
-    wi, wo : (3,) and (n, 3), unit vectors away from the surface.
-    wavelength : nm.
-    pixels : a period.
-
-    Returns
-    -------
-    (n,) in 1/sr.
-    """
-    width = WIDTHS_PER_SIGMA * LOBE_SIGMA
-    return reference.brdf(grating.heights(pixels), wi, wo, wavelength, coherence_width=width)
 
 
 def in_plane(sine: ArrayLike) -> NDArray[np.float64]:

@@ -56,13 +56,19 @@ class Deviation(NamedTuple):
     sum: float
 
 
-class Efficiencies(NamedTuple):
-    """Efficiencies of an order by the default model, the table, and the solver beside."""
+class Row(NamedTuple):
+    """Efficiencies at one wavelength, (n,) each: orders, cosines, truth, model and table."""
 
-    order: int
-    model: float
-    table: float
-    truth: float
+    order: NDArray[np.int64]
+    cosine: Real
+    truth: Real
+    model: Real
+    table: Real
+
+    @property
+    def coloured(self) -> NDArray[np.bool_]:
+        """Orders but 0 within `GRAZING`."""
+        return (self.order != 0) & (self.cosine > _HORIZON)
 
 
 class Diffuse(NamedTuple):
@@ -122,19 +128,12 @@ class Case:
             for values in ([row.model for row in rows], [row.table for row in rows])
         ]
 
-    def side_by_side(self, theta: float, phi: float) -> list[Efficiencies]:
-        """Return the efficiencies of order 0 and of the strongest other one, at `SHOWN`."""
+    def side_by_side(self, theta: float, phi: float) -> Row:
+        """Return order 0 and the strongest other one, at `SHOWN`."""
         row = self._efficiencies(theta, phi, SHOWN)
         strongest = int(np.argmax(np.where(row.coloured, row.truth, -1.0)))
-        shown = [int(np.flatnonzero(row.order == 0)[0])]
-        if row.coloured[strongest]:
-            shown.append(strongest)
-        return [
-            Efficiencies(
-                int(row.order[n]), float(row.model[n]), float(row.table[n]), float(row.truth[n])
-            )
-            for n in shown
-        ]
+        shown = [int(np.flatnonzero(row.order == 0)[0]), strongest]
+        return Row(*(column[shown[: 1 + row.coloured[strongest]]] for column in row))
 
     def diffuse(self, samples: int = SAMPLES) -> list[Diffuse]:
         """Return the deviations from the table's own solver, of each kind of light."""
@@ -175,7 +174,7 @@ class Case:
             float(size.max()),
         )
 
-    def _efficiencies(self, theta: float, phi: float, wavelength: float) -> _Row:
+    def _efficiencies(self, theta: float, phi: float, wavelength: float) -> Row:
         recipe, table = self.recipe, self.table
         sine, turn = np.sin(np.radians(theta)) / recipe.superstrate, np.radians(phi)
         wi = np.array([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - sine**2)])
@@ -187,7 +186,7 @@ class Case:
         index = self._index(wavelength)
         model = efficiencies(self.field, index, wi, wo, inside, "small_slope", sigma=LOBE_SIGMA)
         solved = table.efficiency(-wi[0], wi[1], wavelength, order)
-        return _Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
+        return Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
 
     def _by_solver(self, solver: Solver, x: float, y: float, lam: float) -> dict[int, float]:
         """Return the efficiencies of all orders by the table's solver."""
@@ -220,17 +219,3 @@ class Case:
 def _unpolarised(solver: Solver, light: Light) -> dict[int, float]:
     """Return the efficiencies of all orders."""
     return {m: float(power.mean()) for m, power in powers_of(solver, light).items()}
-
-
-class _Row(NamedTuple):
-    """Efficiencies at one wavelength, (n,) each: orders, cosines, truth, model and table."""
-
-    order: NDArray[np.int64]
-    cosine: Real
-    truth: Real
-    model: Real
-    table: Real
-
-    @property
-    def coloured(self) -> NDArray[np.bool_]:
-        return (self.order != 0) & (self.cosine > _HORIZON)

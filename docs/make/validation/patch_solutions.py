@@ -20,8 +20,9 @@ from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.reference import boundary
 
 from . import crossed, rayleigh
+from .cases import index_of
 from .light import direction
-from .patches import SURFACES, PatchCase, cell, patch_cases, patch_index
+from .patches import SURFACES, PatchCase, cell, patch_cases
 from .solutions import DATA, Work, load_rows
 
 #: A row is one order (mx, my) of one case: wavelength in nm, angles in degrees, `surface` the place
@@ -91,7 +92,7 @@ def work(material: str, solver: str) -> Work:
         "resolutions of gratings and of cells": RESOLUTIONS[solver],
     }
     file = file_of(material, solver)
-    return Work(patch_cases(material), partial(_by_file, file, solver), {file: about})
+    return Work(list(patch_cases(material)), partial(_by_file, file, solver), {file: about})
 
 
 def _by_file(file: str, solver: str, case: PatchCase) -> dict[str, NDArray[np.void]]:
@@ -101,7 +102,7 @@ def _by_file(file: str, solver: str, case: PatchCase) -> dict[str, NDArray[np.vo
 def solve_case(case: PatchCase, solver: str) -> NDArray[np.void]:
     """Rows of one case, by one of `SOLVERS` at two resolutions."""
     field = cell(case.surface)
-    index = patch_index(case.material, case.wavelength)
+    index = index_of(case.material, case.wavelength)
     solved = Solved(case, np.empty(0, PATCH_ROW))
     coarse, fine = (
         SOLVERS[solver].solve(field, index, case.wavelength, solved.wi, *resolution)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import importlib.metadata
 import json
 import os
 import zipfile
@@ -119,19 +119,8 @@ class Solutions:
         return Solutions(self.rows[self.converged], self.about)
 
 
-def save(solutions: Solutions, path: str | os.PathLike[str]) -> None:
-    """Write an .npz file, atomically.
-
-    Raises
-    ------
-    DiffractionError
-        If it cannot be written.
-    """
-    save_rows(solutions.rows, solutions.about, path)
-
-
 def load(path: str | os.PathLike[str]) -> Solutions:
-    """Read what `save` wrote.
+    """Read what `save_rows` wrote.
 
     Raises
     ------
@@ -144,7 +133,13 @@ def load(path: str | os.PathLike[str]) -> Solutions:
 def save_rows(
     rows: NDArray[np.void], about: Mapping[str, Any], path: str | os.PathLike[str]
 ) -> None:
-    """Write rows of any type as columns, and what made them, as `save`."""
+    """Write rows of any type as columns of an .npz file, and what made them.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be written.
+    """
     text = json.dumps(dict(about), indent=1, ensure_ascii=False)
     columns = {name: rows[name] for name in rows.dtype.names or ()}
     with atomic_path(path) as temporary:
@@ -243,3 +238,9 @@ def imported(module: str) -> Any:
             f"{module.partition('.')[0]} is not installed; install the extra: "
             "pip install '.[validation]'"
         ) from error
+
+
+def version(package: str) -> str:
+    """Return the version of a package of the extra; errors as `imported`."""
+    imported(package)
+    return importlib.metadata.version(package)

@@ -9,17 +9,17 @@ python -m docs.make.validation.solve films                # under a film; second
 from __future__ import annotations
 
 import argparse
-import contextlib
 import datetime
 import itertools
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from mitsuba_diffraction.cli import Bar, check_outputs
 
 from . import coated, coupled_wave, filmed, integral, patch_solutions
 from .cases import MATERIALS, Scan, index_text, scans
-from .solutions import DATA, LIGHTS, Solutions, Work, imported, order_rows, save_rows
+from .solutions import DATA, LIGHTS, Solutions, Work, order_rows, save_rows
 
 #: Each solves a `Scan` at one of its `resolutions`.
 SOLVERS: dict[str, ModuleType] = {"integral": integral, "coupled_wave": coupled_wave}
@@ -40,7 +40,6 @@ def of_gratings(material: str, solver: str) -> Work:
     method, wanted = SOLVERS[solver], scans(material)
     if method is coupled_wave:
         wanted = coupled_wave.part_of(wanted)
-    imported(method.PACKAGE)
     file = f"{material}_{solver}"
     about = {"solver": method.name(), "material": material, "index": index_text(material)}
     return Work(wanted, partial(_by_file, file, solver), {file: about})
@@ -105,20 +104,8 @@ def _solve_twice(scan: Scan, method: ModuleType, first: Any, final: Any) -> Solu
     return Solutions(np.concatenate(rows), {})
 
 
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """BLAS in each process would fight the others for the processors."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+#: Threads of one process: BLAS in each would fight the others for the processors.
+_ONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def _jobs(text: str) -> int:
@@ -146,7 +133,7 @@ def main(args: argparse.Namespace) -> None:
     # Children start anew: what they inherit of BLAS's threads could not be changed
     with (
         Bar(args, unit=" cases") as bar,
-        _one_thread_each(),
+        mock.patch.dict(os.environ, _ONE),
         multiprocessing.get_context("spawn").Pool(args.jobs) as pool,
     ):
         for n, solved in enumerate(pool.imap(work.solve, work.cases)):
@@ -160,4 +147,8 @@ def main(args: argparse.Namespace) -> None:
     for file, path in paths.items():
         every = np.concatenate(rows[file])
         save_rows(every, made | work.about[file], path)
-        print(f"wrote {path}: {len(every)} orders")
+        change = max(np.nanmax(every[c]) for c in every.dtype.names or () if c.endswith("change"))
+        print(
+            f"wrote {path}: {len(every)} orders; the last refinement changed them by "
+            f"{change:.1g} at most"
+        )

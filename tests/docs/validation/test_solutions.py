@@ -19,7 +19,7 @@ from docs.make.validation.cases import (
     index_of,
     scans,
 )
-from docs.make.validation.solutions import CONVERGED, KEY, ROW, Solutions, load, save, shipped
+from docs.make.validation.solutions import CONVERGED, KEY, ROW, Solutions, load, save_rows, shipped
 from docs.make.validation.solve import main, solve_scan
 from mitsuba_diffraction.errors import DiffractionError
 
@@ -174,7 +174,7 @@ def test_what_was_saved_is_loaded(tmp_path):
     rows = np.zeros(3, ROW)
     rows["te"], rows["tm"], rows["te_change"] = 0.5, np.nan, 0.25
     path = tmp_path / "x.npz"
-    save(Solutions(rows, {"solver": "none"}), path)
+    save_rows(rows, {"solver": "none"}, path)
     loaded = load(path)
     assert loaded.about == {"solver": "none"}
     assert loaded.rows.tobytes() == rows.tobytes()

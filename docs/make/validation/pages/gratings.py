@@ -10,7 +10,7 @@ from .. import goals, models
 from ..cases import Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope, slope_limit
-from .markdown import angle, beside, percent, sentence_case, table
+from .markdown import angle, beside, percent, table
 from .measurements import Measurements
 
 
@@ -110,7 +110,7 @@ facets."""
             for material, part in measured.default.items()
             for grating in gratings_of(part, profile)
         ]
-        header = [sentence_case(profile), *map(angle, angles)]
+        header = [profile.capitalize(), *map(angle, angles)]
         parts.append(table(header, rows))
     return "\n\n".join(parts)
 

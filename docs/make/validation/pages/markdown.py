@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import partial
 
+from docs.make.figures import pages
 
-def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A table whose columns but the first are aligned to the right."""
-    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+#: Table whose columns but the first are aligned to the right.
+table = partial(pages.table, right=True)
 
 
 def percent(value: float) -> str:
@@ -36,8 +36,3 @@ def beside(*columns: Iterable[float]) -> list[str]:
 def joined(values: Sequence[float]) -> str:
     """Numbers as a sentence has them: 1, 2 and 3."""
     return ", ".join(f"{value:g}" for value in values[:-1]) + f" and {values[-1]:g}"
-
-
-def sentence_case(text: str) -> str:
-    """Text with its first letter in upper case."""
-    return text[:1].upper() + text[1:]

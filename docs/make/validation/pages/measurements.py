@@ -61,7 +61,7 @@ class Measurements:
     @cached_property
     def films(self) -> list[filmed.FilmDeviations]:
         """Deviations of gratings under each film."""
-        return [filmed.compare_models(stack) for stack in filmed.STACKS[: self.most(1)]]
+        return [filmed.of_stack(stack) for stack in filmed.STACKS[: self.most(1)]]
 
     @cached_property
     def statistics(self) -> statistics.Statistics:

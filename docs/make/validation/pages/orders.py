@@ -85,10 +85,10 @@ def _side_by_side(cases: Sequence[orders.Case], mounts: Sequence[tuple[int, int]
     rows = []
     for case in cases:
         for theta, phi in mounts:
-            for order in case.side_by_side(theta, phi):
-                number = f"{order.order}".replace("-", "−")
-                values = [f"{v:.4f}" for v in (order.model, order.table, order.truth)]
-                rows.append([case.name, f"{theta}°, {phi}°", number, *values])
+            row = case.side_by_side(theta, phi)
+            for order, *values in zip(row.order, row.model, row.table, row.truth, strict=True):
+                number = f"{order}".replace("-", "−")
+                rows.append([case.name, f"{theta}°, {phi}°", number, *(f"{v:.4f}" for v in values)])
     return table(["table", "θ, φ", "order", "default", "solved", "truth"], rows)
 
 

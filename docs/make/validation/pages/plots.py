@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Compariso
         ):
             table = np.maximum(table_of(part, sinusoids, angles, of_colours), _SMALLEST)
             for column, (theta, colour) in enumerate(
-                zip(angles, _shades(len(angles)), strict=True)
+                zip(angles, colormaps["viridis"](np.linspace(0, 0.9, len(angles))), strict=True)
             ):
                 panel.loglog(
                     slopes, table[:, column], marker, ms=5, color=colour, mfc=fill,
@@ -200,12 +201,6 @@ def _gentle(comparison: Comparison) -> NDArray[np.bool_]:
 def _title(grating: Grating) -> str:
     edges = grating.profile != "sinusoidal"  # with a slope beyond what pixels can tell
     return str(grating) if edges else f"{grating}, RMS slope {rms_slope(grating):.2f}"
-
-
-def _shades(n: int) -> NDArray[np.float64]:
-    from matplotlib import colormaps
-
-    return np.asarray(colormaps["viridis"](np.linspace(0, 0.9, n)))
 
 
 def _frame(axes: Axes, **legend: Any) -> None:
