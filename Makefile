@@ -120,7 +120,7 @@ release: setup  ## check and build a release into out/release; TESTS=1 tests the
 	@.ci/release
 
 validation: setup .venv/validation  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
-	@$(PYTHON3) -m docs.make.validation report -o docs
+	@$(PYTHON3) -m docs.make.validation -o docs
 
 # KAIST=FOLDER compares a clone of github.com/KAIST-VCLAB/color-brdfs-with-wave-optics too
 measured: setup  ## compare model and solved orders with measured gratings: docs/validation/measured.md

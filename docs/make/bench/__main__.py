@@ -10,24 +10,104 @@ All candidates are timed in one run: compare its ratios, and its times only on a
 from __future__ import annotations
 
 import argparse
+import functools
+import gc
 import sys
 import tempfile
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
+
+import drjit as dr
 
 from mitsuba_diffraction.analysis.machine import describe_machine
 from mitsuba_diffraction.cli import Bar, check_outputs
 from mitsuba_diffraction.cli.console import say_warning
 from mitsuba_diffraction.cli.report import save_json
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.scene.load import set_variant
 
-from ..figures.pages import measured_options, measured_patch, option, program
-from . import figures, sections
+from ..figures.pages import (
+    measured_options,
+    measured_patch,
+    option,
+    program,
+    progress_option,
+)
+from . import figures
+from .build import measure_builds
+from .contenders import build_tables
+from .evaluation import measure_colours, measure_eval, measure_sampling
+from .figures import Plan, Section
+from .orders import measure_orders
+from .scenes import measure_efficiency, measure_noise
+from .snake import measure_snake
+from .survey import measure_survey
+from .updates import measure_updates
 
 PARTS = (
     "build", "survey", "eval", "sample", "snake", "orders", "noise", "efficiency", "update",
     "colours", "frames",
 )  # fmt: skip
+
+
+def _check_scenes(folder: Path) -> None:
+    """Refuse a folder without the project's scenes, before anything is measured."""
+    for name in ("snake.xml", "textures/elaphe.png", "meshes/elaphe.ply"):
+        if not (folder / name).is_file():
+            raise DiffractionError(
+                f"'{folder / name}' does not exist; name the folder of the project's scenes with "
+                "--scenes, or measure a part without them: --only build, eval, sample, noise or "
+                "update"
+            )
+
+
+def _sections(
+    parts: Collection[str],
+    plan: Plan,
+    folder: Path,
+    progress: Progress,
+    scenes: Path,
+    patch: HeightField | None,
+) -> Iterator[Section]:
+    """Measure parts one after the other, those with kernels on every backend of this machine.
+
+    folder : for temporary files.
+    patch : evaluated instead of the plan's own.
+    """
+    tables = functools.cache(lambda: build_tables(plan, folder, progress, patch))
+
+    def frames() -> list[Section]:
+        from .frames import measure_frames
+
+        return [measure_frames(plan, tables(), scenes, progress)]
+
+    def made(measures: dict[str, Callable[[], Iterable[Section]]]) -> Iterator[Section]:
+        for part, measure in measures.items():
+            if part in parts:
+                yield from measure()
+                gc.collect()  # the next part's kernels would hold the code of BSDFs of this one
+
+    yield from made({
+        "build": lambda: [measure_builds(plan, folder, progress)],
+        "survey": lambda: [measure_survey(plan, folder, progress)],
+    })  # fmt: skip
+    for backend in ("llvm", "cuda"):
+        if dr.has_backend(getattr(dr.JitBackend, backend.upper())):
+            set_variant(f"{backend}_ad_spectral")
+            yield from made({
+                "eval": lambda: [measure_eval(plan, tables(), progress)],
+                "sample": lambda: measure_sampling(plan, tables(), progress),
+                "snake": lambda: [measure_snake(plan, tables(), scenes, progress)],
+                "orders": lambda: measure_orders(plan, scenes, progress),
+                "noise": lambda: [measure_noise(plan, tables(), progress)],
+                "efficiency": lambda: [measure_efficiency(plan, tables(), scenes, progress)],
+                "update": lambda: [measure_updates(folder, progress)],
+                "colours": lambda: measure_colours(plan, tables(), scenes, progress),
+            })  # fmt: skip
+    yield from made({"frames": frames})
 
 
 @program(
@@ -42,10 +122,7 @@ PARTS = (
         "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
         help="folder of the project's scenes; default: scenes",
     ),
-    option(
-        "--progress", action=argparse.BooleanOptionalAction, default=None,
-        help="show progress bars; by default on a terminal",
-    ),
+    progress_option(),
     *measured_options("height field to measure; default: gratings.elaphe_like"),
 )  # fmt: skip
 def main(args: argparse.Namespace) -> None:
@@ -66,7 +143,7 @@ def main(args: argparse.Namespace) -> None:
         say_warning("the machine is busy: trust the ratios, not the times")
     measured = []
     with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
-        for section in sections(parts, plan, Path(folder), bar, args.scenes, patch):
+        for section in _sections(parts, plan, Path(folder), bar, args.scenes, patch):
             tqdm.write("\n".join(["", *section.lines()]))  # above the progress bar
             sys.stdout.flush()
             measured.append(section)
@@ -83,17 +160,3 @@ def main(args: argparse.Namespace) -> None:
         print("\n".join(figures.compared(earlier, data)))
     if args.json is not None:
         save_json(args.json, data)
-
-
-def _check_scenes(folder: Path) -> None:
-    """Refuse a folder without the project's scenes, before anything is measured."""
-    if not (folder / "snake.xml").is_file():
-        raise DiffractionError(
-            f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
-            "with --scenes, or measure a part without them: --only build, eval, sample, noise or "
-            "update"
-        )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

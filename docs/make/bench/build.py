@@ -1,21 +1,18 @@
-"""Building tables: time and memory, each table in a process of its own.
-
-That process is `python -m ...build HEIGHTS.npy PIXEL_SIZE ARGUMENTS`, the last being those of
-`DiffractionTable.build` as JSON; or `... HEIGHTS.npy PIXEL_SIZE make SIDE`, which makes the
-heights.
-"""
+"""Building tables: time and memory, each table in a process of its own."""
 
 from __future__ import annotations
 
-import json
+import contextlib
+import multiprocessing
 import os
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
@@ -79,9 +76,8 @@ def measure_builds(plan: Plan, folder: Path, progress: Progress) -> Section:
 
 
 def _measured(case: Case, folder: Path) -> Row:
-    report = json.loads(
-        _child(str(_heights(case.side, folder)), repr(PIXEL), json.dumps(case.arguments))
-    )
+    with new_process() as child:
+        report = child(_build, _heights(case.side, folder), case.arguments)
     peak, imported = report["peak_bytes"] / 1e9, report["imported_bytes"] / 1e9
     error = max(report["table"]["measured_error"].values()) / report["table"]["tolerance"]
     values = (report["seconds"], report["cpu_seconds"], peak, peak - imported, error)
@@ -97,62 +93,47 @@ def _heights(side: int, folder: Path) -> Path:
     """File with the heights of a patch, made where it is missing (which takes a while)."""
     file = folder / f"heights-{side}.npy"
     if not file.is_file():
-        _child(str(file), repr(PIXEL), "make", str(side))
+        with new_process() as child:
+            child(_make, file, side)
     return file
 
 
-def _child(*arguments: str) -> str:
-    """Run a child process; return its output."""
-    result = subprocess.run(
-        [sys.executable, "-m", f"{__package__}.build", *arguments],
-        env=child_environment(),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if result.returncode != 0:
-        last = (result.stderr.strip().splitlines() or ["no message"])[-1]
-        raise DiffractionError(f"building a table in a child process failed: {last}")
-    return result.stdout
+@contextlib.contextmanager
+def new_process() -> Iterator[Callable[..., Any]]:
+    """Yield a function that calls others in one new process.
 
-
-def child_environment() -> dict[str, str]:
-    """Return the environment of a child that finds the package where this process did.
-
-    It has one thread for linear algebra, as commands have.
+    That has one thread for linear algebra, as commands have.
     """
-    threads = {"OPENBLAS_NUM_THREADS": "1"}
-    return {
-        **threads,
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
-    }
+    threads = {"OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "1")}
+    with (
+        mock.patch.dict(os.environ, threads),
+        ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor,
+    ):
+
+        def call(work: Callable[..., Any], *arguments: Any) -> Any:
+            try:
+                return executor.submit(work, *arguments).result()
+            except BrokenProcessPool as error:
+                raise DiffractionError(f"a child process of the bench failed: {error}") from error
+
+        yield call
 
 
-def build(heights: str, pixel_size: float, arguments: str) -> None:
-    """Build the table of the heights in a file, and print time, memory and the table's summary."""
+def _build(heights: Path, arguments: dict[str, Any]) -> dict[str, Any]:
+    """Build the table of the heights in a file; return time, memory and the table's summary."""
     imported = peak_memory()
-    patch = HeightField(np.load(heights), pixel_size, name="elaphe_like")
+    patch = HeightField(np.load(heights), PIXEL, name="elaphe_like")
     start, start_cpu = time.perf_counter(), time.process_time()
-    table = DiffractionTable.build(patch, **json.loads(arguments))
-    report = {
+    table = DiffractionTable.build(patch, **arguments)
+    return {
         "seconds": time.perf_counter() - start,
         "cpu_seconds": time.process_time() - start_cpu,
         "peak_bytes": peak_memory(),
         "imported_bytes": imported,
         "table": {k: v for k, v in table.summary().items() if k != "source"},
     }
-    print(json.dumps(report))
 
 
-def make(heights: str, pixel_size: float, side: int) -> None:
+def _make(heights: Path, side: int) -> None:
     """Write the heights of a patch with so many pixels a side."""
-    np.save(heights, gratings.elaphe_like(side * pixel_size, side).heights)
-
-
-if __name__ == "__main__":
-    if sys.argv[3] == "make":
-        make(sys.argv[1], float(sys.argv[2]), int(sys.argv[4]))
-    else:
-        build(sys.argv[1], float(sys.argv[2]), sys.argv[3])
+    np.save(heights, gratings.elaphe_like(side * PIXEL, side).heights)

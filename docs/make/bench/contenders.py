@@ -38,6 +38,8 @@ ON_SURFACE = "diffraction, surface"
 TILED = "diffraction, surface, random tiles"
 THESIS = "thesis: Taylor, 37 terms, 3×3, an image a term"
 TAYLOR = "the same series, all terms of a bin together"
+#: Fewer calls of these do, for the sake of the user's time.
+SLOW = (THESIS, TAYLOR)
 
 
 @dataclass(frozen=True)
@@ -115,11 +117,6 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
         THESIS: lambda: thesis_bsdf(tables.paths["thesis"]),
         TAYLOR: ours("thesis"),
     }
-
-
-def is_slow(name: str) -> bool:
-    """Whether fewer calls do, for the sake of the user's time."""
-    return name in (THESIS, TAYLOR)
 
 
 def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]:

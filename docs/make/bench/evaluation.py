@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,14 +18,13 @@ from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.timing import (
     Queries,
     kernel_operations,
-    kernel_seconds,
     kernel_time,
     ratio,
     rounds_of,
     vector_lanes,
 )
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
-from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.progress import Progress, silent
 from mitsuba_diffraction.tables.colour.table import ColourTable
 
 from .contenders import (
@@ -37,11 +36,11 @@ from .contenders import (
     KIRCHHOFF_AL,
     ON_SURFACE,
     ONE_WINDOW,
+    SLOW,
     THESIS,
     Tables,
     bare_gathers,
     bsdf_factories,
-    is_slow,
 )
 from .figures import Goal, Plan, Row, Section
 from .scenes import pigment, rays, snake
@@ -76,13 +75,14 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
     lanes: dict[str, int] = {}
     for name, make in bsdf_factories(tables).items():
         bsdf = make()
-        asked = queries[is_slow(name)]
+        asked = queries[name in SLOW]
         lanes[name] = len(asked.sample1)
         calls[name] = partial(bsdf.eval, context, asked.si, asked.wo)
         if name == DEFAULT:
             calls[FLOOR] = bare_gathers(bsdf.table, queries[False])
             lanes[FLOOR] = lanes[name]
-    times, processor = _nanoseconds(plan, calls, lanes, "eval", progress)
+    timed = time_calls(plan, calls, "eval", progress, lanes)
+    times = timed.clock
     to_rough = ratio(times[DEFAULT], times[ALUMINIUM])
     to_thesis = ratio(times[THESIS], times[DEFAULT])
     to_kirchhoff = ratio(times[DEFAULT], times[KIRCHHOFF])
@@ -100,8 +100,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         ],
         THESIS: [Goal("at least 30× the defaults", to_thesis >= 30.0)],
     }
-    title, operations = f"eval: {_conditions(plan, tables)}", operations_of(calls)
-    return _section(title, times, processor, lanes, goals, operations)
+    return timed_section(f"eval: {_conditions(plan, tables)}", timed, goals)
 
 
 def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
@@ -116,53 +115,67 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
         calls[f"sample {name}"] = partial(bsdf.sample, *drawing)
         for what in ("eval", "eval_pdf", "pdf"):
             calls[f"{what} {name}"] = partial(getattr(bsdf, what), context, queries.si, queries.wo)
-    lanes = dict.fromkeys(calls, plan.lanes)
-    times, processor = _nanoseconds(plan, calls, lanes, "eval, sample and pdf", progress)
-    operations, sections = operations_of(calls), []
+    timed, sections = time_calls(plan, calls, "eval, sample and pdf", progress), []
     for what, most in (("sample", 1.5), ("eval_pdf", 1.15), ("pdf", None)):
-        nanoseconds, busy = (
-            {name: of[f"{what} {name}"] for name in names} for of in (times, processor)
-        )
-        evals = {name: ratio(nanoseconds[name], times[f"eval {name}"]) for name in names}
+        evals = {
+            name: ratio(timed.clock[f"{what} {name}"], timed.clock[f"eval {name}"])
+            for name in names
+        }
         goals = {
             name: [Goal(f"at most {most:g}× eval", evals[name] <= most)]
             for name in (DEFAULT, DEFAULT_AL)
             if most is not None
         }
         title = f"{what}: {_conditions(plan, tables)}"
-        counts = {name: operations[f"{what} {name}"] for name in names}
-        lanes = dict.fromkeys(names, plan.lanes)
-        section = _section(title, nanoseconds, busy, lanes, goals, counts)
+        section = timed_section(title, timed.of(what), goals)
         for row in section.rows:
             row.values[_EVAL] = evals[row.name]
         sections.append(replace(section, columns=(*section.columns, _EVAL)))
     return sections
 
 
-def operations_of(calls: Mapping[str, Callable[[], Any]]) -> dict[str, int]:
-    """Return the number of operations in each call's kernels."""
-    return {name: kernel_operations(call) for name, call in calls.items()}
-
-
 def _queries(plan: Plan, slow: bool) -> Queries:
     return Queries.random(plan.slow_lanes if slow else plan.lanes)
 
 
-def _nanoseconds(
+@dataclass(frozen=True)
+class Timed:
+    """Times of calls by name, in ns a lane: of the clock and of all cores; lanes and operations."""
+
+    clock: dict[str, list[float]]
+    processor: dict[str, list[float]]
+    lanes: dict[str, int]
+    operations: dict[str, int]
+
+    def of(self, what: str) -> Timed:
+        """Return the calls whose names begin with a word, without it."""
+        parts = (self.clock, self.processor, self.lanes, self.operations)
+        start = f"{what} "
+        return Timed(
+            *(
+                {n.removeprefix(start): v for n, v in p.items() if n.startswith(start)}
+                for p in parts
+            )
+        )
+
+
+def time_calls(
     plan: Plan,
-    calls: dict[str, Callable[[], Any]],
-    lanes: dict[str, int],
+    calls: Mapping[str, Callable[[], Any]],
     what: str,
     progress: Progress,
-) -> tuple[dict[str, list[float]], dict[str, list[float]]]:
-    """Return nanoseconds a lane on the clock, and of all cores together."""
+    lanes: dict[str, int] | None = None,
+) -> Timed:
+    """Time calls in rounds; `lanes` of each call, by default those of the plan."""
+    lanes = lanes or dict.fromkeys(calls, plan.lanes)
     timed = {name: partial(kernel_time, call) for name, call in calls.items()}
     measured = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, what))
     clock, processor = (
         {name: [1e9 * each[n] / lanes[name] for each in taken] for name, taken in measured.items()}
         for n in (0, 1)
     )
-    return clock, processor
+    operations = {name: kernel_operations(call) for name, call in calls.items()}
+    return Timed(clock, processor, lanes, operations)
 
 
 def _conditions(plan: Plan, tables: Tables) -> str:
@@ -175,35 +188,28 @@ def _conditions(plan: Plan, tables: Tables) -> str:
     )
 
 
-def _section(
-    title: str,
-    times: dict[str, list[float]],
-    processor: dict[str, list[float]],
-    lanes: dict[str, int],
-    goals: Mapping[str, Sequence[Goal]],
-    operations: Mapping[str, int],
-) -> Section:
-    baselines = {heading: name for heading, name in _BASELINES.items() if name in times}
+def timed_section(title: str, timed: Timed, goals: Mapping[str, Sequence[Goal]]) -> Section:
+    """Return a row for each call, with ratios to the baselines among them."""
+    baselines = {heading: name for heading, name in _BASELINES.items() if name in timed.clock}
     rows = []
-    for name, taken in times.items():
+    for name, taken in timed.clock.items():
         values: dict[str, float | None] = {_TIMES: statistics.median(taken)}
-        values[_CPU] = statistics.median(processor[name])
+        values[_CPU] = statistics.median(timed.processor[name])
         for heading, baseline in baselines.items():
-            values[heading] = ratio(taken, times[baseline])
-        values[_OPERATIONS] = operations[name]
-        raw = {"ns": taken, "cpu_ns": processor[name], "lanes": lanes[name]}
+            values[heading] = ratio(taken, timed.clock[baseline])
+        values[_OPERATIONS] = timed.operations[name]
+        raw = {"ns": taken, "cpu_ns": timed.processor[name], "lanes": timed.lanes[name]}
         rows.append(Row(name, values, goals.get(name, ()), raw))
     return Section(title, (_TIMES, _CPU, *baselines, _OPERATIONS), rows)
 
 
-def measure_colours(
-    plan: Plan, tables: Tables, scenes: Path, backend: str, progress: Progress
-) -> list[Section]:
-    """Differences between the RGB and the spectral variant, then size, time and speed.
+def measure_colours(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> list[Section]:
+    """Differences between the RGB variant and the spectral one that is set; size, time and speed.
 
     Leaves the spectral variant set.
     """
-    rgb, spectral = f"{backend}_ad_rgb", f"{backend}_ad_spectral"
+    spectral = mi.variant()
+    rgb = spectral.replace("spectral", "rgb")
     rows = []
     total = len(MATERIALS) + 2
     for n, (name, (parameters, strict)) in enumerate(MATERIALS.items()):
@@ -295,18 +301,13 @@ def _cost(plan: Plan, tables: Tables, rgb: str, spectral: str) -> Section:
     start = time.perf_counter()
     table = ColourTable.build(tables.load("default"))
     built = time.perf_counter() - start
-    calls: dict[str, list[float]] = {}
+    nanoseconds = {}
     for variant in (rgb, spectral):
         mi.set_variant(variant)
-        bsdf = tables.bsdf("default")
-        queries = Queries.random(plan.lanes)
+        bsdf, queries = tables.bsdf("default"), Queries.random(plan.lanes)
         call = partial(bsdf.eval, mi.BSDFContext(), queries.si, queries.wo)
-        calls |= rounds_of(
-            {variant: partial(kernel_seconds, call)}, plan.rounds, lambda done, total: None
-        )
-    nanoseconds = {
-        variant: 1e9 * statistics.median(taken) / plan.lanes for variant, taken in calls.items()
-    }
+        timed = time_calls(plan, {variant: call}, "colours", silent)
+        nanoseconds[variant] = statistics.median(timed.clock[variant])
     times = nanoseconds[rgb] / nanoseconds[spectral]
     megabytes = table.nbytes / 1e6
     columns = ("MB", "s to build", "eval, ns/call", "× spectral")

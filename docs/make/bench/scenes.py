@@ -14,7 +14,7 @@ import numpy as np
 
 from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.timing import SEED
-from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.plugin.power import PowerModel
 from mitsuba_diffraction.plugin.sampling import EVEN
 from mitsuba_diffraction.progress import Progress
@@ -28,6 +28,8 @@ _GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
 AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
 #: Wavelengths of the light whose noise is measured, nm.
 WAVELENGTHS = (450.0, 550.0, 650.0)
+#: Columns of the noise of one sample over these.
+NOISE = ("least", "median", "most", "largest weight")
 #: Samples a pixel of the rendering in which bright pixels are looked for.
 FIREFLY_SPP = 64
 
@@ -47,21 +49,20 @@ def furnace(bsdf: Any, resolution: int) -> Any:
     )
 
 
-def window() -> dict[str, Any]:
-    """A dim sky, dark ground, and a bright window of 20 × 20 degrees."""
-    return {
-        "light": {
-            "type": "envmap",
-            "bitmap": mi.Bitmap(_window_map()),
-            "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], 90),
-        }
-    }
+def window(rows: int = 128) -> dict[str, Any]:
+    """A dim sky, dark ground, and a bright window of 20 × 20 degrees; `rows` of the map."""
+    light = np.full((rows, 2 * rows, 3), 0.5, np.float32)
+    light[rows // 2 :] = 0.05
+    degree = rows / 180.0
+    top, left = int(35 * degree), int(200 * degree)
+    light[top : top + int(20 * degree), left : left + int(20 * degree)] = 30.0
+    turned = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
+    return {"light": {"type": "envmap", "bitmap": mi.Bitmap(light), "to_world": turned}}
 
 
 def pigment(scenes: Path) -> dict[str, Any]:
     """The snake's own colours, to lie beneath the diffracting surface."""
     file = scenes / "textures" / "elaphe.png"
-    _check_there(file)
     scale = mi.ScalarTransform4f().scale([0.05, 1.0, 1.0])
     return {
         "type": "diffuse",
@@ -72,7 +73,6 @@ def pigment(scenes: Path) -> dict[str, Any]:
 def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any]) -> Any:
     """The coiled snake without the ground."""
     mesh = scenes / "meshes" / "elaphe.ply"
-    _check_there(mesh)
     above = mi.ScalarTransform4f().look_at(
         origin=[2.3, -32, 26], target=[1.4, -0.7, 0.6], up=[0, 0, 1]
     )
@@ -92,7 +92,6 @@ def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any
 def snake_scene(scenes: Path, table: Path, **parameters: str) -> Any:
     """`snake.xml` with a table, without warnings of how far the model holds for it."""
     file = scenes / "snake.xml"
-    _check_there(file)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         return mi.load_file(str(file), patch=str(table), **parameters)
@@ -125,14 +124,6 @@ def rays(scene: Any, side: int) -> tuple[int, Any]:
     return width * height, sensor.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))[0]
 
 
-def _check_there(file: Path) -> None:
-    if not file.is_file():
-        raise DiffractionError(
-            f"'{file}' does not exist; run this where the project's scenes are, or name their "
-            "folder with --scenes"
-        )
-
-
 def _frame(to_world: Any, width: int, height: int) -> dict[str, Any]:
     return {
         "type": "scene",
@@ -152,45 +143,16 @@ def _frame(to_world: Any, width: int, height: int) -> dict[str, Any]:
     }
 
 
-def _window_map(rows: int = 128) -> np.ndarray[Any, np.dtype[np.float32]]:
-    """Latitude-longitude map (rows, 2 rows, 3) of the `window`."""
-    light = np.full((rows, 2 * rows, 3), 0.5, np.float32)
-    light[rows // 2 :] = 0.05
-    degree = rows / 180.0
-    top, left = int(35 * degree), int(200 * degree)
-    light[top : top + int(20 * degree), left : left + int(20 * degree)] = 30.0
-    return light
-
-
 def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Relative standard deviation of one sample's estimate of the directional albedo."""
     orders = tables.bsdf("default", material="none", energy_conserving=False)
     cosine = draws_by_cosine(tables.bsdf("default", material="none", energy_conserving=False))
-    columns = ("least", "median", "most", "largest weight", "by the cosine")
-    rows = []
+    columns, rows = (*NOISE, "by the cosine"), []
     for n, (theta, goal) in enumerate(_GOALS.items()):
         progress(n, len(_GOALS), "noise")
-        samples = [
-            deviation_of(orders, theta, phi, wavelength, plan.lanes)
-            for phi in AZIMUTHS
-            for wavelength in WAVELENGTHS
-        ]
-        deviations = [deviation for deviation, _ in samples]
-        values = (
-            min(deviations),
-            float(np.median(deviations)),
-            max(deviations),
-            max(weight for _, weight in samples),
-            deviation_of(cosine, theta, 0.0, 550.0, plan.lanes)[0],
-        )
-        rows.append(
-            Row(
-                f"{theta:g}°",
-                dict(zip(columns, values, strict=True)),
-                [Goal(f"at most {goal:g}", max(deviations) <= goal)],
-                {"standard deviations": deviations},
-            )
-        )
+        row = noise_row(f"{theta:g}°", orders, theta, goal, plan.lanes)
+        row.values[columns[-1]] = deviation_of(cosine, theta, 0.0, 550.0, plan.lanes)[0]
+        rows.append(row)
     progress(len(_GOALS), len(_GOALS), "noise")
     title = (
         "noise: relative standard deviation of one sample's albedo, R = 1, raw Kirchhoff, "
@@ -198,6 +160,23 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
         f"{WAVELENGTHS[0]:g} to {WAVELENGTHS[-1]:g} nm"
     )
     return Section(title, columns, rows)
+
+
+def noise_row(name: str, bsdf: Any, theta: float, most: float, lanes: int) -> Row:
+    """Return `NOISE` of a BSDF for light at an angle; `most` is the goal."""
+    samples = [
+        deviation_of(bsdf, theta, phi, wavelength, lanes)
+        for phi in AZIMUTHS
+        for wavelength in WAVELENGTHS
+    ]
+    deviations, weights = (list(column) for column in zip(*samples, strict=True))
+    values = (min(deviations), float(np.median(deviations)), max(deviations), max(weights))
+    return Row(
+        name,
+        dict(zip(NOISE, values, strict=True)),
+        [Goal(f"at most {most:g}", max(deviations) <= most)],
+        {"standard deviations": deviations},
+    )
 
 
 def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:

@@ -36,7 +36,6 @@ class Comparison:
     noise : mean ΔE2000 that two such pictures of the same light would have.
     noise_of_cycles : the part of Cycles' picture in it.
     seconds : of Cycles, for all samples.
-    covered : blocks that the shape covers.
     """
 
     mitsuba: Picture
@@ -45,7 +44,6 @@ class Comparison:
     noise: float
     noise_of_cycles: float
     seconds: Seconds
-    covered: NDArray[np.bool_]
 
     @property
     def beyond_noise(self) -> float:
@@ -79,9 +77,9 @@ def compare(
             np.array(mi.render(scene, spp=mitsuba_samples // 2, seed=seed)) for seed in (0, 1)
         )
         depth = mi.render(scene, integrator=mi.load_dict({"type": "depth"}), spp=16)
-        covered = _blocks(np.array(depth)[..., :1] > 0.0, block)[..., 0] == 1.0
+        covered = blocks(np.array(depth)[..., :1] > 0.0, block)[..., 0] == 1.0
         means = [np.mean(pair, axis=0) for pair in (mitsuba, cycles)]
-        halves_of_blocks = [[_blocks(half, block) for half in pair] for pair in (mitsuba, cycles)]
+        halves_of_blocks = [[blocks(half, block) for half in pair] for pair in (mitsuba, cycles)]
         reference, other = (np.mean(pair, axis=0) for pair in halves_of_blocks)
         white = 1.0 / float(np.percentile(reference[covered].mean(axis=-1), 95.0))
         noise = [
@@ -89,11 +87,11 @@ def compare(
         ]  # the mean of two halves has half the noise of their difference
         difference = _mean_delta_e(reference, other, white, covered)
         whole = math.hypot(*noise)
-        found.append(Comparison(*means, difference, whole, noise[1], time, covered))
+        found.append(Comparison(*means, difference, whole, noise[1], time))
     return found
 
 
-def _blocks(picture: NDArray[Any], side: int) -> NDArray[np.float64]:
+def blocks(picture: NDArray[Any], side: int) -> NDArray[np.float64]:
     """Return the means over blocks of pixels; the rest at the right and below is left out."""
     rows, columns = (size // side for size in picture.shape[:2])
     cut = picture[: rows * side, : columns * side].astype(np.float64)

@@ -42,10 +42,15 @@ def main() -> None:
         scene.render.image_settings.color_management = "OVERRIDE"
         scene.render.image_settings.linear_colorspace_settings.name = "Linear Rec.709"
         scene.render.filepath = job["output"]
-        clock, processor = time.perf_counter(), time.process_time()
-        bpy.ops.render.render(write_still=True)
-        clock, processor = time.perf_counter() - clock, time.process_time() - processor
-        print(f"seconds {clock:.2f} processor {processor:.2f}", flush=True)
+        render()
+
+
+def render() -> None:
+    """Render the scene to its file, and print the seconds."""
+    clock, processor = time.perf_counter(), time.process_time()
+    bpy.ops.render.render(write_still=True)
+    clock, processor = time.perf_counter() - clock, time.process_time() - processor
+    print(f"seconds {clock:.2f} processor {processor:.2f}", flush=True)
 
 
 def settings(samples: int, seed: int, width: int, height: int) -> Any:
@@ -78,11 +83,7 @@ def shape(kind: str) -> Any:
 def material(surface: dict[str, Any]) -> Any:
     """Return a grey or a glossy material, or that of an exported folder."""
     if "folder" in surface:
-        script = os.path.join(surface["folder"], "blender_material.py")
-        spec = importlib.util.spec_from_file_location("blender_material", script)
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
-        made = module.add_material(surface["folder"], tangent=surface["tangent"])
+        made = exported(surface["folder"], surface["tangent"])
         group = next(node for node in made.node_tree.nodes if node.type == "GROUP")
         for name, value in surface["inputs"].items():
             if isinstance(value, list):  # a colour, which nodes have in the working space
@@ -102,6 +103,15 @@ def material(surface: dict[str, Any]) -> Any:
         node.inputs["Roughness"].default_value = math.sqrt(surface["glossy"])
     made.node_tree.links.new(node.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs[0])
     return made
+
+
+def exported(folder: str, tangent: str) -> Any:
+    """Return the material of an exported folder, by the script in it."""
+    script = os.path.join(folder, "blender_material.py")
+    spec = importlib.util.spec_from_file_location("blender_material", script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.add_material(folder, tangent=tangent)
 
 
 def lights(scene: Any, light: dict[str, Any]) -> None:
@@ -125,7 +135,7 @@ def lights(scene: Any, light: dict[str, Any]) -> None:
     place(bpy.data.objects.new("lamp", lamp), light["position"], (0, 0, 0))
 
 
-def camera(position: list[float], target: list[float], angle: float) -> Any:
+def camera(position: Any, target: Any, angle: float) -> Any:
     """Return a camera at a position; angle : horizontal, degrees."""
     lens = bpy.data.cameras.new("camera")
     lens.sensor_fit, lens.angle = "HORIZONTAL", math.radians(angle)

@@ -9,15 +9,15 @@ render. Imports nothing of the package: bpy and the exported blender_material.py
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import math
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
 import bpy
-from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parent))  # which a blender executable leaves out
+from inside import camera, exported, place, render
 
 #: Distance between the plinths.
 _STEP = 2.6
@@ -36,7 +36,7 @@ def main() -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.set_working_color_space(working_space="Linear Rec.2020")
     disc, foil, scale = (
-        exported(folder, tangent)
+        exported(str(folder), tangent)
         for folder, tangent in zip(options.folders, ("radial-z", "uv", "uv"), strict=True)
     )
     inputs(disc)["Rotation (°)"].default_value = -90.0
@@ -60,22 +60,11 @@ def main() -> None:
     scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces = 3, 1
     scene.render.resolution_x, scene.render.resolution_y = options.size
-    scene.camera = camera()
+    scene.camera = camera((0, -12.5, 4.6), (0, 0, 1.15), 36)
     if options.picture:
         scene.render.filepath = str(options.picture.resolve())
-        clock, processor = time.perf_counter(), time.process_time()
-        bpy.ops.render.render(write_still=True)
-        clock, processor = time.perf_counter() - clock, time.process_time() - processor
-        print(f"seconds {clock:.2f} processor {processor:.2f}", flush=True)
+        render()
     bpy.ops.wm.save_as_mainfile(filepath=str(options.output.resolve()), compress=True)
-
-
-def exported(folder: Path, tangent: str) -> Any:
-    """Return the material of an exported folder, by the script that lies in it."""
-    spec = importlib.util.spec_from_file_location("material", folder / "blender_material.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.add_material(folder, tangent=tangent)
 
 
 def inputs(material: Any) -> Any:
@@ -124,29 +113,13 @@ def lights() -> None:
     world = bpy.data.worlds.new("room")
     bpy.context.scene.world = world
     world.node_tree.nodes["Background"].inputs[0].default_value = (0.1, 0.11, 0.13, 1)
-    for name, place, size, power in (
+    for name, position, size, power in (
         ("lamp", (-3.5, -6.0, 7.5), 1.0, 900.0),
         ("soft", (5.0, 2.0, 5.5), 3.5, 900.0),
     ):
         lamp = bpy.data.lights.new(name, "AREA")
         lamp.shape, lamp.size, lamp.energy = "DISK", size, power
-        aim(bpy.data.objects.new(name, lamp), place, (0, 0, 1))
-
-
-def camera() -> Any:
-    """Return the camera."""
-    lens = bpy.data.cameras.new("camera")
-    lens.angle = math.radians(36)
-    return aim(bpy.data.objects.new("camera", lens), (0, -12.5, 4.6), (0, 0, 1.15))
-
-
-def aim(thing: Any, place: tuple[float, float, float], target: tuple[float, float, float]) -> Any:
-    """Add an object to the scene, with its −z axis towards a target."""
-    thing.location = place
-    towards = Vector(target) - Vector(place)
-    thing.rotation_euler = towards.to_track_quat("-Z", "Y").to_euler()
-    bpy.context.collection.objects.link(thing)
-    return thing
+        place(bpy.data.objects.new(name, lamp), position, (0, 0, 1))
 
 
 if __name__ == "__main__":

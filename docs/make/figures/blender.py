@@ -6,7 +6,6 @@ python -m docs.make.figures.blender [-o docs] [--quick] [--samples N] [PART ...]
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +18,8 @@ import mitsuba_diffraction as md
 from docs.make.blender.compare import Comparison, compare
 from docs.make.blender.program import run_in_blender, seconds
 from docs.make.blender.views import LIGHTS, Surface, View
-from mitsuba_diffraction.cli import main as run_command
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.optics.colour import encode_srgb
 
 from . import pages
 from .pages import option, program
@@ -57,9 +56,7 @@ class Example:
     def export(self) -> None:
         """Export the surface unless it is there."""
         if not list(self.folder.glob("*.osl")):
-            words = ["export-osl", self.source, "-o", str(self.folder)]
-            if run_command(words) != 0:
-                raise DiffractionError(f"'{' '.join(words)}' failed; see above")
+            pages.run("export-osl", self.source, "-o", self.folder)
 
     def surface(self) -> Surface:
         """Return the material of both renderers."""
@@ -137,9 +134,7 @@ def side_by_side(compared: Sequence[Comparison], target: Path) -> None:
     for comparison in compared:
         both = np.concatenate([comparison.mitsuba, comparison.cycles])
         shown = np.clip(both / np.percentile(both.mean(axis=-1), 97.0), 0.0, 1.0)
-        columns.append(
-            np.where(shown < 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
-        )
+        columns.append(encode_srgb(shown))
     image = Image.fromarray((255.0 * np.concatenate(columns, axis=1) + 0.5).astype(np.uint8))
     file = _FOLDER / "side_by_side.png"
     image.resize((4 * image.width, 4 * image.height), Image.Resampling.NEAREST).save(file)
@@ -185,7 +180,3 @@ def main(args: argparse.Namespace) -> None:
         pages.update(page, {"noise": noise(work_folders[1])})
     if "showcase" in parts:
         showcase(images / "showcase.jpg", 16 if args.quick else args.samples)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import sys
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -138,7 +137,3 @@ def main(args: argparse.Namespace) -> None:
     film = film_text(film_times(args.scene))
     print(film)
     pages.update(args.output, {"film": film})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,7 +9,6 @@ The picture goes to `images/evaluation.png` beside the page, the numbers between
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +18,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
@@ -68,14 +66,6 @@ class Periods:
     windows: tuple[float, float]  # mean and standard deviation of single windows
     count: int  # number of those windows
     thesis: float  # period that the procedure of the thesis finds; NaN if none
-
-
-def exact_gratings() -> list[tuple[HeightField, float | None]]:
-    """Gratings with their nominal periods."""
-    return [
-        (blazed(2.5, 0.25, pixels_per_period=60, rows=2), 2.5),
-        (sinusoidal(1.6, 0.1, rows=2), 1.6),
-    ]
 
 
 def evaluate_patch(
@@ -164,7 +154,11 @@ def period_table(patches: Sequence[Periods]) -> str:
 )
 def main(args: argparse.Namespace) -> None:
     """Make the picture and the tables."""
-    patches = exact_gratings()
+    # with the periods that they are made with
+    patches: list[tuple[HeightField, float | None]] = [
+        (blazed(2.5, 0.25, pixels_per_period=60, rows=2), 2.5),
+        (sinusoidal(1.6, 0.1, rows=2), 1.6),
+    ]
     measured = measured_patch(args)
     if measured is not None:
         patches.append((measured, None))
@@ -181,9 +175,5 @@ def main(args: argparse.Namespace) -> None:
             )
         )
     pages.update(args.output, {"periods": period_table(results)})
-    with atomic_path(args.output.parent / "images" / "evaluation.png") as path:
-        evaluation_figure(results).savefig(path, format="png")
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    picture = args.output.parent / "images" / "evaluation.png"
+    pages.write_figure(picture, evaluation_figure(results))

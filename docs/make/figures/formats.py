@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from pathlib import Path
 
 from mitsuba_diffraction.heights.formats.catalogue import sections
@@ -35,7 +34,3 @@ def main(args: argparse.Namespace) -> None:
     """Write the tables into the page."""
     page = args.output / "formats.md"
     pages.update(page, {"formats": tables()})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

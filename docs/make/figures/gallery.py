@@ -12,7 +12,6 @@ import contextlib
 import io
 import shlex
 import shutil
-import sys
 import tempfile
 import time
 from dataclasses import dataclass
@@ -270,7 +269,3 @@ def main(args: argparse.Namespace) -> None:
     pages.update(args.output / "gallery.md", {"gallery": markdown("gallery")})
     parts = {name: markdown(name) for name in ("meshes", "meshes-field")}
     pages.update(args.output / "meshes.md", parts)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

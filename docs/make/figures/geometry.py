@@ -6,7 +6,6 @@ python -m docs.make.figures.geometry -o docs/images/geometry.png
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
-from mitsuba_diffraction.atomic import atomic_path
-
-from .pages import option, program
+from .pages import option, program, write_figure
 
 #: Light of the drawing: angle from the normal, degrees; wavelength over period.
 THETA, RATIO = 35.0, 0.34
@@ -112,10 +109,4 @@ def _above(axes: Axes) -> None:
 @program(option("-o", "--output", metavar="PNG", type=Path, required=True))
 def main(args: argparse.Namespace) -> None:
     """Draw the picture."""
-    output: Path = args.output
-    with atomic_path(output) as path:
-        figure().savefig(path, format="png", metadata={"Software": None})
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    write_figure(args.output, figure())

@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.heights.read import OPTIONS
 
@@ -44,13 +41,20 @@ def commands_page() -> str:
     ]
     for title, names in {**GROUPS, **({"More": tuple(left)} if left else {})}.items():
         rows = [
-            (f"`{name}`", _arguments(parsers[name][0]), _sentence(parsers[name][1]))
+            (
+                f"`{name}`",
+                _arguments(parsers[name][0]),
+                parsers[name][1][:1].upper() + parsers[name][1][1:],
+            )
             for name in names
             if name in parsers
         ]
         sections += [f"## {title}", pages.table(("command", "arguments", "what it does"), rows)]
     rows = [
-        (f"`--{name.replace('_', '-')} {each.metavar}`", _cell(each.help))
+        (
+            f"`--{name.replace('_', '-')} {each.metavar}`",
+            each.help.replace("|", r"\|").replace("%%", "%"),
+        )
         for name, each in OPTIONS.items()
     ]
     sections += [
@@ -87,14 +91,6 @@ def _arguments(parser: argparse.ArgumentParser) -> str:
         elif "-o" in action.option_strings:
             shown.append(f"-o {action.metavar or ''}".strip())
     return f"`{' '.join(shown)}`" if shown else ""
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", r"\|").replace("%%", "%")
 
 
 def python_page() -> str:
@@ -137,21 +133,9 @@ _MOST = 10
 PAGES = {"commands.md": commands_page, "python.md": python_page}
 
 
-def write_pages(folder: Path) -> Iterator[Path]:
-    """Write the pages and yield their paths."""
-    for name, made in PAGES.items():
-        with atomic_path(folder / name) as temporary:
-            temporary.write_text(made(), encoding="utf-8")
-        yield folder / name
-
-
 @program(option("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs")))
 def main(args: argparse.Namespace) -> None:
     """Write the pages."""
-    folder: Path = args.output
-    for path in write_pages(folder):
-        print(f"wrote {path}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    for name, made in PAGES.items():
+        pages.write_text(args.output / name, made())
+        print(f"wrote {args.output / name}")

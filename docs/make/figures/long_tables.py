@@ -9,12 +9,9 @@ import argparse
 import csv
 import io
 import re
-import sys
 from pathlib import Path
 
-from mitsuba_diffraction.atomic import atomic_path
-
-from .pages import option, program
+from .pages import option, program, write_text
 
 #: Rows from which a table is a file.
 LONG = 6
@@ -37,8 +34,7 @@ def write_page(path: Path, text: str) -> list[Path]:
         if f"]({old.name})" not in shown:
             old.unlink()
     for name, content in (*tables.items(), (path.name, shown)):
-        with atomic_path(path.parent / name) as temporary:
-            temporary.write_text(content, encoding="utf-8")
+        write_text(path.parent / name, content)
     return [path, *(path.parent / name for name in tables)]
 
 
@@ -87,7 +83,3 @@ def main(args: argparse.Namespace) -> None:
         if separated(text := page.read_text(encoding="utf-8"), page.stem)[1]:
             for path in write_page(page, text):
                 print(f"wrote {path}")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

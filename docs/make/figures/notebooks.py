@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -80,7 +79,3 @@ def main(args: argparse.Namespace) -> None:
             nbformat.write(notebook, temporary)
         seconds = time.perf_counter() - start
         print(f"{path}: {seconds:.1f} s, {path.stat().st_size / 1e3:.0f} kB", flush=True)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

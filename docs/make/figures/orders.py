@@ -6,15 +6,11 @@ python -m docs.make.figures.orders [--quick] [--only cd]
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import mitsuba as mi
@@ -22,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from mitsuba_diffraction.cli import main as run_command
-from mitsuba_diffraction.errors import DiffractionError
+from docs.make.blender.compare import blocks
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import natural
 from mitsuba_diffraction.scene.load import load_scene, set_variant
@@ -136,13 +131,6 @@ def row(scene: Scene, output: Path, folder: Path, flags: Sequence[str]) -> tuple
     )
 
 
-def _blocks(pixels: NDArray[Any]) -> NDArray[np.float32]:
-    """Return means over blocks of pixels, in which noise is below the differences."""
-    rows, columns = (size // _BLOCK for size in pixels.shape[:2])
-    cut = np.asarray(pixels, np.float32)[: rows * _BLOCK, : columns * _BLOCK]
-    return cut.reshape(rows, _BLOCK, columns, _BLOCK, -1).mean(axis=(1, 3))
-
-
 def _is_on(scene: Scene, flags: Sequence[str]) -> NDArray[np.bool_]:
     """Mask of the blocks whose corners the camera sees on the shape."""
     set_variant(None)
@@ -162,15 +150,12 @@ def _file(scene: Scene) -> Path:
 
 
 def _render(scene: Scene, output: Path, options: Sequence[str]) -> Rendered:
-    words = ["render", str(_file(scene)), "-o", str(output), *options]
     seconds = 0.0
     for few in (["-s", "1"], []):  # the first compiles, and builds tables
         start = time.process_time()
-        with contextlib.redirect_stdout(io.StringIO()):
-            if run_command([*words, *few]) != 0:
-                raise DiffractionError(f"'{' '.join(words)}' failed; see above")
+        pages.run("render", _file(scene), "-o", output, *options, *few)
         seconds = time.process_time() - start
-    pixels = _blocks(np.array(read_exr(output))[..., :3])
+    pixels = blocks(np.array(read_exr(output))[..., :3], _BLOCK)
     return Rendered(pixels, output.with_suffix(".png"), seconds)
 
 
@@ -220,7 +205,3 @@ def main(args: argparse.Namespace) -> None:
     if args.only is None:
         page = "\n\n".join([*shown, pages.table(_HEADER, rows), _HOW.format(_BLOCK)])
         pages.update(args.output / "orders.md", {"orders": page})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

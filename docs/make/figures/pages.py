@@ -1,12 +1,13 @@
 """Shared functions of the programs of this folder: parts of pages, JPEG, measurements, errors.
 
 Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end. Files that are
-missing, damaged or not writable are a DiffractionError, which `exit_code` prints in one line.
+missing, damaged or not writable are a DiffractionError, which a `program` prints in one line.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import json
 import os
@@ -14,13 +15,17 @@ import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from PIL import Image
 
 from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.cli import main as command
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
+
+if TYPE_CHECKING:  # Matplotlib would be a part of what the bench measures
+    from matplotlib.figure import Figure
 
 Made = TypeVar("Made")
 Option: TypeAlias = tuple[tuple[str, ...], dict[str, Any]]
@@ -32,20 +37,22 @@ _QUALITIES = (90, 86, 82, 78, 74, 70, 64, 58)
 
 def replaced(text: str, name: str, content: str) -> str:
     """Return the text with the part of that name replaced between its markers."""
-    begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
-    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
-        raise DiffractionError(f"expected '{begin}' and then '{end}', once each")
-    head, rest = text.split(begin)
-    tail = rest.split(end)[1]
-    return f"{head}{begin}\n{content.strip()}\n{end}{tail}"
+    head, _, tail = _split(text, name)
+    return f"{head}\n{content.strip()}\n{tail}"
 
 
 def part(text: str, name: str) -> str:
     """Return the text between the markers of that name."""
+    return _split(text, name)[1].strip()
+
+
+def _split(text: str, name: str) -> tuple[str, str, str]:
+    """Return what stands before, between and after the markers of that name, with the markers."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
-    if begin not in text or end not in text:
-        raise DiffractionError(f"expected '{begin}' and '{end}'")
-    return text.split(begin)[1].split(end)[0].strip()
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        raise DiffractionError(f"expected '{begin}' and then '{end}', once each")
+    first, last = text.index(begin) + len(begin), text.index(end)
+    return text[:first], text[first:last], text[last:]
 
 
 def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
@@ -57,14 +64,12 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
             text = replaced(text, name, content)
         except DiffractionError as error:
             raise DiffractionError(f"'{file}': {error}") from error
-    with atomic_path(file) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(file, text)
 
 
 def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
     """Replace the parts that a file has markers for."""
-    text = _read(Path(path))
-    present = {name: part for name, part in parts.items() if f"<!-- begin {name} -->" in text}
+    present = {name: parts[name] for name in markers(path) if name in parts}
     if not present:
         raise DiffractionError(
             f"'{path}' has none of the markers {', '.join(f'<!-- begin {n} -->' for n in parts)}"
@@ -84,10 +89,41 @@ def _read(file: Path) -> str:
         raise DiffractionError(f"cannot read '{file}': {error.strerror}") from error
 
 
-def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+def table(header: Sequence[str], rows: Sequence[Sequence[object]], *, right: bool = False) -> str:
+    """A Markdown table; `right` aligns all columns but the first to the right."""
+    head, *body = ("| " + " | ".join(map(str, row)) + " |" for row in (header, *rows))
+    rule = "| --- |" + " ---: |" * (len(header) - 1) if right else "|" + "---|" * len(header)
+    return "\n".join([head, rule, *body])
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_figure(path: Path, figure: Figure, dpi: float | None = None) -> None:
+    """Write a figure as PNG without the name of its software: equal figures are equal files.
+
+    dpi : of the picture; None is that of the figure.
+    """
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=dpi or "figure", metadata={"Software": None})
+
+
+def run(*words: object) -> None:
+    """Run a command of the package and say nothing, since it would name temporary files.
+
+    Raises
+    ------
+    DiffractionError
+        If the command fails, after its own message.
+    """
+    typed = [str(word) for word in words]
+    with contextlib.redirect_stdout(io.StringIO()):
+        code = command(typed)
+    if code != 0:
+        raise DiffractionError(f"'{' '.join(typed)}' failed; see above")
 
 
 def write_jpeg(
@@ -129,6 +165,14 @@ def option(*names: str, **how: Any) -> Option:
     return names, how
 
 
+def progress_option() -> Option:
+    """Return the option of programs with a progress bar."""
+    return option(
+        "--progress", action=argparse.BooleanOptionalAction, default=None,
+        help="show progress bars; by default on a terminal",
+    )  # fmt: skip
+
+
 def measured_options(what: str) -> tuple[Option, ...]:
     """Return the options that name a measured patch; `what` is the help of the first."""
     lengths = (("--pixel-size", "DX"), ("--max-height", "H"))
@@ -141,7 +185,9 @@ def measured_options(what: str) -> tuple[Option, ...]:
 def program(*options: Option) -> Callable[[Callable[[argparse.Namespace], None]], Main]:
     """Return a decorator that makes a function of parsed options the `main` of its module.
 
-    That returns 0, or 1 after an error, which is printed in one line; its help is the module's.
+    That returns 0, 130 if it was interrupted, or 1 after an error, which is printed in one line.
+    Its help is the module's. A module that is run as a program exits with it here: it has to be the
+    module's last function.
     """
 
     def made(work: Callable[[argparse.Namespace], None]) -> Main:
@@ -155,8 +201,18 @@ def program(*options: Option) -> Callable[[Callable[[argparse.Namespace], None]]
             for names, how in options:
                 parser.add_argument(*names, **how)
             args = parser.parse_args(argv)
-            return exit_code(name.rpartition(".")[2], lambda: work(args))
+            try:
+                work(args)
+            except DiffractionError as error:
+                print(f"{name.rpartition('.')[2]}: error: {error}", file=sys.stderr)
+                return 1
+            except KeyboardInterrupt:
+                print("interrupted; no half-written file was left behind", file=sys.stderr)
+                return 130
+            return 0
 
+        if work.__module__ == "__main__":
+            sys.exit(main())
         return main
 
     return made
@@ -183,13 +239,3 @@ def from_json(file: Path, make: Callable[[Any], Made], *, writer: str, remedy: s
         raise DiffractionError(
             f"'{file}' is not what {writer} writes ({error}); {remedy}"
         ) from error
-
-
-def exit_code(name: str, work: Callable[[], None]) -> int:
-    """Run `work` and return 0, or 1 after an error, which is printed in one line."""
-    try:
-        work()
-    except DiffractionError as error:
-        print(f"{name}: error: {error}", file=sys.stderr)
-        return 1
-    return 0

@@ -8,14 +8,12 @@ from __future__ import annotations
 import argparse
 import ast
 import re
-import sys
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import mitsuba_diffraction
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
@@ -149,9 +147,4 @@ def _prose(text: str) -> str:
 )  # fmt: skip
 def main(args: argparse.Namespace) -> None:
     """Write the page."""
-    with atomic_path(args.output) as temporary:
-        temporary.write_text(page(), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    pages.write_text(args.output, page())

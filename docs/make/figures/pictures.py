@@ -1,4 +1,4 @@
-"""Pictures of docs/images: patches and their light, BRDF maps, the snakes of the scenes.
+"""Pictures of docs/images: patches and their light, BRDF maps, the snake of the README.
 
     python -m docs.make.figures.pictures -o docs/images \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
@@ -7,14 +7,10 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
-import sys
 import tempfile
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,27 +19,25 @@ from matplotlib.figure import Figure
 from mitsuba_diffraction.analysis.maps import LightDirection, brdf_map, draw
 from mitsuba_diffraction.analysis.maps.picture import signed
 from mitsuba_diffraction.analysis.pictures import patches_figure
-from mitsuba_diffraction.atomic import atomic_path
-from mitsuba_diffraction.cli import main as command
-from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, cd, dvd, elaphe_like, xenopeltis_like
 
-from .pages import exit_code, measured_options, measured_patch, write_jpeg
+from .pages import (
+    measured_options,
+    measured_patch,
+    option,
+    program,
+    run,
+    write_figure,
+    write_jpeg,
+)
 
 LOOKALIKES = (elaphe_like, xenopeltis_like, cd, dvd)
 LIGHTS = (LightDirection(0.0), LightDirection(45.0, 180.0))
-#: Names of the snakes' pictures and what is rendered: scene, azimuth of the sun in degrees.
-SNAKES = {
-    "snake": ("snake.xml", 120),
-    "snake_other_light": ("snake.xml", 60),
-    "xenopeltis": ("xenopeltis.xml", 120),
-    "xenopeltis_other_light": ("xenopeltis.xml", 60),
-}
 
 _RESOLUTION = 300  # pixels of a map; drawn one to one
 _DPI = 100
-_SIZE = (900, 563)
 
 
 def maps_figure(
@@ -92,42 +86,10 @@ def _perfect_reflector(field: HeightField) -> Any:
         return mi.load_dict(bsdf_dict(field, material="none"))
 
 
-def render_snakes(
-    folder: Path, scenes: Path, *, spp: int, size: tuple[int, int] = _SIZE
-) -> list[Path]:
-    """Render all `SNAKES` to JPEG files in `folder`."""
-    written = []
-    for name, (scene, azimuth) in SNAKES.items():
-        file = scenes / scene
-        if not file.is_file():
-            raise DiffractionError(
-                f"'{file}' does not exist; run this where the project's scenes are, or name their "
-                "folder with --scenes"
-            )
-        output = folder / f"{name}.jpg"
-        with tempfile.TemporaryDirectory() as temporary:
-            png = Path(temporary, "picture.png")
-            values = {
-                "light": "daylight.xml",
-                "sun_azimuth": azimuth,
-                "resx": size[0],
-                "resy": size[1],
-            }
-            defined = [part for key, value in values.items() for part in ("-D", f"{key}={value}")]
-            with contextlib.redirect_stdout(io.StringIO()):  # it would name the temporary file
-                code = command(["render", str(file), "-o", str(png), "-s", str(spp), *defined])
-            if code != 0:
-                raise DiffractionError(f"rendering '{file}' failed; see above")
-            write_jpeg(png, output)
-        written.append(output)
-    return written
-
-
 def _patches(args: argparse.Namespace) -> None:
     """Draw all look-alikes, below a measured patch if there is one."""
     fields = [*_measured(args), *(make() for make in LOOKALIKES)]
-    with atomic_path(args.output / "patches.png") as path:
-        patches_figure(fields).savefig(path, dpi=80, format="png")
+    write_figure(args.output / "patches.png", patches_figure(fields), 80)
 
 
 def _maps(args: argparse.Namespace) -> None:
@@ -136,12 +98,17 @@ def _maps(args: argparse.Namespace) -> None:
 
     fields = [*_measured(args), elaphe_like(), xenopeltis_like(), cd(), blazed(2.5, 0.25)]
     set_variant(None)
-    with atomic_path(args.output / "maps.png") as path:
-        maps_figure(fields).savefig(path, dpi=_DPI, format="png")
+    write_figure(args.output / "maps.png", maps_figure(fields), _DPI)
 
 
-def _snakes(args: argparse.Namespace) -> None:
-    render_snakes(args.output, args.scenes, spp=args.spp)
+def _snake(args: argparse.Namespace) -> None:
+    """Render the snake of the README in the sun."""
+    values = {"light": "daylight.xml", "sun_azimuth": 120, "resx": 900, "resy": 563}
+    defined = [part for key, value in values.items() for part in ("-D", f"{key}={value}")]
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder, "picture.png")
+        run("render", args.scenes / "snake.xml", "-o", picture, "-s", args.spp, *defined)
+        write_jpeg(picture, args.output / "snake.jpg")
 
 
 def _measured(args: argparse.Namespace) -> list[HeightField]:
@@ -153,32 +120,24 @@ def _measured(args: argparse.Namespace) -> list[HeightField]:
 FIGURES: dict[str, Callable[[argparse.Namespace], None]] = {
     "patches": _patches,
     "maps": _maps,
-    "snakes": _snakes,
+    "snake": _snake,
 }
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Make the requested pictures, and return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.pictures")
-    parser.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs/images"))
-    parser.add_argument(
+@program(
+    option("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs/images")),
+    option(
         "--only", metavar="NAME", action="append", choices=tuple(FIGURES),
         help=f"one of {', '.join(FIGURES)}; may be given several times",
-    )  # fmt: skip
-    for names, how in measured_options("height field to compare with, drawn first"):
-        parser.add_argument(*names, **how)
-    parser.add_argument("--scenes", metavar="FOLDER", type=Path, default=Path("scenes"))
-    parser.add_argument("-s", "--spp", metavar="N", type=int, default=64, help="of renderings")
-    args = parser.parse_args(argv)
+    ),
+    *measured_options("height field to compare with, drawn first"),
+    option("--scenes", metavar="FOLDER", type=Path, default=Path("scenes")),
+    option("-s", "--spp", metavar="N", type=int, default=64, help="of renderings"),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Make the requested pictures."""
     args.output.mkdir(parents=True, exist_ok=True)
     for name in args.only or FIGURES:
         start = time.perf_counter()
-        code = exit_code(name, partial(FIGURES[name], args))
-        if code != 0:
-            return code
+        FIGURES[name](args)
         print(f"{name}: {time.perf_counter() - start:.1f} s")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

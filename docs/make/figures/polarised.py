@@ -6,15 +6,12 @@ python -m docs.make.figures.polarised
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from mitsuba_diffraction.cli import main as run_command
-from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.orders import OrderTable
 
 from . import pages
@@ -70,8 +67,7 @@ def main(args: argparse.Namespace) -> None:
         folder = Path(name)
         files = {kind: folder / f"{kind}.nc" for kind in ("efficiencies", "Mueller matrices")}
         for (_, file), option in zip(files.items(), ([], ["--polarised"]), strict=True):
-            if run_command([*COMMAND, *option, "-o", str(file)]):
-                raise DiffractionError(f"'{file.name}' cannot be solved; see above")
+            pages.run(*COMMAND, *option, "-o", file)
         table = OrderTable.load(files["Mueller matrices"])
         figure(table).savefig(folder / "figure.png", dpi=110)
         write_jpeg(folder / "figure.png", picture)
@@ -83,7 +79,3 @@ def main(args: argparse.Namespace) -> None:
     text = f"{caption}\n\n![efficiency and polarisation](images/orders/{_NAME}.jpg)\n\n{cost}"
     text += "\n\n`python -m docs.make.figures.polarised` makes the figure and the table."
     pages.update(args.output / "orders.md", {_NAME: text})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,17 +6,14 @@ python -m docs.make.figures.presets -o docs
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from pathlib import Path
 
 from PIL import Image, ImageDraw
 
-from mitsuba_diffraction.cli import main as run_command
-from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.plugin.presets import presets
 
-from .pages import option, program, write_jpeg
+from .pages import option, program, run, write_jpeg
 
 PICTURE = Path("images", "presets.jpg")
 _MESH = Path("scenes", "meshes", "knot.ply")
@@ -33,11 +30,10 @@ def draw(folder: Path, samples: int) -> Path:
     pen = ImageDraw.Draw(sheet)
     for number, name in enumerate(names):
         one = folder / f"{name}.png"
-        command = ["render", str(_MESH), "--preset", name, "-s", str(samples),
-                   "-D", f"resx={width}", "-D", f"resy={height}", "--clamp", "20", "--denoise",
-                   "-o", str(one)]  # fmt: skip
-        if run_command(command):
-            raise DiffractionError(f"the picture of {name} failed; its message stands above")
+        run(
+            "render", _MESH, "--preset", name, "-s", samples, "-D", f"resx={width}",
+            "-D", f"resy={height}", "--clamp", 20, "--denoise", "-o", one,
+        )  # fmt: skip
         x, y = number % _COLUMNS * width, number // _COLUMNS * (height + _LABEL)
         with Image.open(one.with_stem(f"{name}_denoised")) as picture:
             sheet.paste(picture.convert("RGB"), (x, y))
@@ -56,7 +52,3 @@ def main(args: argparse.Namespace) -> None:
     with tempfile.TemporaryDirectory() as folder:
         picture = draw(Path(folder), args.samples)
         write_jpeg(picture, args.output / PICTURE, most=_MOST)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -8,7 +8,6 @@ python -m docs.make.figures.realtime out/compare/snake out/compare/cd
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,26 +23,6 @@ SHEET = Path("images", "realtime.jpg")
 
 _OURS = ("fast", "exact")
 _METHOD, _WIDTH = "fast", 1600
-
-
-@program(
-    option(
-        "compared", metavar="FOLDER", type=Path, nargs="+",
-        help="written by compare; the page shows the first one's sheet, times and textures",
-    ),
-    option(
-        "--sheet", metavar="FOLDER", type=Path,
-        help="a larger picture, of which the sheet is shown; default: the first's",
-    ),
-    option("-o", "--output", metavar="FILE", type=Path, default=Path("docs/realtime.md")),
-)  # fmt: skip
-def main(args: argparse.Namespace) -> None:
-    """Replace picture and tables."""
-    text = _tables([folder / "compare.json" for folder in args.compared])
-    sheet = args.output.parent / SHEET
-    folder = args.sheet or args.compared[0]
-    write_jpeg(folder / f"{_METHOD}.png", sheet, width=_WIDTH)
-    pages.update(args.output, {"realtime": text})
 
 
 def _tables(files: Sequence[Path]) -> str:
@@ -94,5 +73,21 @@ def _complete(document: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+@program(
+    option(
+        "compared", metavar="FOLDER", type=Path, nargs="+",
+        help="written by compare; the page shows the first one's sheet, times and textures",
+    ),
+    option(
+        "--sheet", metavar="FOLDER", type=Path,
+        help="a larger picture, of which the sheet is shown; default: the first's",
+    ),
+    option("-o", "--output", metavar="FILE", type=Path, default=Path("docs/realtime.md")),
+)  # fmt: skip
+def main(args: argparse.Namespace) -> None:
+    """Replace picture and tables."""
+    text = _tables([folder / "compare.json" for folder in args.compared])
+    sheet = args.output.parent / SHEET
+    folder = args.sheet or args.compared[0]
+    write_jpeg(folder / f"{_METHOD}.png", sheet, width=_WIDTH)
+    pages.update(args.output, {"realtime": text})

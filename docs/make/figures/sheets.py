@@ -6,15 +6,14 @@ python -m docs.make.figures.sheets
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction import HeightField, reference
+from docs.make.validation.light import direction, heights_of, light_on
+from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import sigma_of
-from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile, sinusoidal
@@ -58,37 +57,24 @@ def row(case: Case) -> tuple[str, ...]:
 
 def _missed(case: Case, theta: float, phi: float, wavelength: float) -> float:
     """Return Σ|model − solution| over Σ solution, of the transmitted orders but 0."""
-    turn, tilt = np.radians(phi), np.radians(theta)
-    wi = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])
-    period = case.profile.period
-    cell = cells.to_cell(-wi[0], -wi[1], wavelength, period)
-    w = cells.w_of(cell.k_continuous, wavelength, _RANGE, period)
+    wi, period = direction(theta, phi), case.profile.period
     grating = Grating(case.profile, material_of(_INDEX, _RANGE), 1.0, _RANGE, thin=True)
-    station = grating.station(
-        int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), float(w)
-    )
+    station, channel = light_on(grating, -wi[0], -wi[1], wavelength)
     amplitudes = IntegralSolver(case.profile, case.points).amplitudes(station)
-    powers = sheet_efficiencies(amplitudes, station)[0, int(cell.channel)]
+    powers = sheet_efficiencies(amplitudes, station)[0, channel]
     solved = powers[:, station.channels :].mean(axis=0).sum(axis=-1)
-    orders = int(cell.channel) - np.arange(station.channels)
+    orders = channel - np.arange(station.channels)
     x = orders * wavelength / (1e3 * period) - wi[0]
     y = np.full(len(x), -wi[1])
     wo = np.stack([x, y, -np.sqrt(1.0 - x**2 - y**2)], axis=-1)
     # the power of a lobe from the value at its centre
     width = sigma_of(_WIDTH) * 2e3 * np.pi / wavelength
     values = reference.btdf(
-        _heights(case.profile), np.tile(wi, (len(wo), 1)), wo, wavelength,
+        heights_of(case.profile, 64, 4), np.tile(wi, (len(wo), 1)), wo, wavelength,
         eta=_INDEX, thin=True, coherence_width=_WIDTH,
     )  # fmt: skip
     others = orders != 0
     return float(np.abs(values * np.pi / width**2 - solved)[others].sum() / solved[others].sum())
-
-
-def _heights(profile: Profile) -> HeightField:
-    x, z = profile.closed
-    step = profile.period / 64
-    heights = np.interp((np.arange(64) + 0.5) * step, x, z)
-    return HeightField(np.tile(heights, (4, 1)), step, periodic=True)
 
 
 @program(option("-o", "--output", type=Path, default=Path("docs"), help="of the page"))
@@ -98,7 +84,3 @@ def main(args: argparse.Namespace) -> None:
     text = pages.table(header, [row(case) for case in CASES])
     text += "\n\n`python -m docs.make.figures.sheets` makes this table."
     pages.update(args.output / "orders.md", {"sheets": text})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

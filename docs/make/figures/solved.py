@@ -5,13 +5,13 @@ python -m docs.make.figures.solved
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 from mitsuba_diffraction import OrderTable
 
 from . import pages
-from .pages import exit_code
+from .pages import option, program
 
 _FOLDER = Path("precompute/orders")
 _HEADER = (
@@ -43,10 +43,7 @@ def text() -> str:
     return f"{pages.table(_HEADER, rows)}\n\n{_HOW}"
 
 
-def main() -> int:
-    """Write the table and return the exit code."""
-    return exit_code("solved", lambda: pages.update("docs/orders.md", {"solved": text()}))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+@program(option("-o", "--output", type=Path, default=Path("docs"), help="of the page"))
+def main(args: argparse.Namespace) -> None:
+    """Write the table."""
+    pages.update(args.output / "orders.md", {"solved": text()})

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import shutil
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -299,7 +298,8 @@ def main(args: argparse.Namespace) -> None:
             file, partial(part.tables, name=file.stem), writer=part.writer, remedy=part.remedy
         )
         for name, text in parts.items():  # a table goes on with the rows of the next file
-            texts[name] = f"{texts[name]}\n{_rows_of(text)}" if name in texts else text
+            rows = text.split("\n", 2)[-1]
+            texts[name] = f"{texts[name]}\n{rows}" if name in texts else text
     for page in args.output or map(Path, part.pages):
         pages.update_present(page, texts)
         if args.part in _LONG:
@@ -307,12 +307,3 @@ def main(args: argparse.Namespace) -> None:
     for name in part.pictures:
         with atomic_path(args.images / name) as temporary:
             shutil.copyfile(args.measured[0] / name, temporary)
-
-
-def _rows_of(table: str) -> str:
-    """A table without its head."""
-    return table.split("\n", 2)[2]
-
-
-if __name__ == "__main__":
-    sys.exit(main())

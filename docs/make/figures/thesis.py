@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +19,6 @@ from pathlib import Path
 
 from mitsuba_diffraction.analysis.maps.picture import contact_sheet
 from mitsuba_diffraction.analysis.maps.result import LightDirection
-from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
@@ -169,8 +167,7 @@ def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
             title=f"{patch.name}: {kind}",
             exposure=None if best is None else best.map.exposure(),
         )
-        with atomic_path(page.parent / "images" / f"sweep-{kind}.png") as path:
-            sheet.savefig(path, format="png")
+        pages.write_figure(page.parent / "images" / f"sweep-{kind}.png", sheet)
     pages.update(page, parts)
 
 
@@ -192,7 +189,3 @@ def main(args: argparse.Namespace) -> None:
         # how far the model holds is not the question here
         warnings.simplefilter("ignore", DiffractionWarning)
         PROGRAMS[args.page](args, patch)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

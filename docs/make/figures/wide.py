@@ -123,7 +123,3 @@ def main(args: argparse.Namespace) -> None:
     print(text, json.dumps(agreement(windowed.table, whole.table)), sep="\n")
     if args.output:
         pages.update(args.output, {"wide": text})
-
-
-if __name__ == "__main__":
-    sys.exit(main())

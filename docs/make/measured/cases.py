@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from mitsuba_diffraction.atomic import atomic_path
+from docs.make.figures.pages import write_text
+from mitsuba_diffraction.orders.solve.profiles import Profile
 
 from . import predict
 from .grooves import Groove
@@ -61,7 +62,8 @@ class Case:
     name, laboratory : of the grating, and who measured it.
     wavelengths, measured, error : (n,); wavelengths in nm, error 0 where none is printed.
     drawing : groove as it is printed, before any fit.
-    solved, modelled : efficiencies of a groove at wavelengths.
+    period : µm.
+    solved, modelled : efficiencies of a profile at wavelengths.
     path : of light per height of the surface, for roughness.
     fits : whether the measurement is used to fit; else `like` has the fitted groove.
     """
@@ -72,15 +74,16 @@ class Case:
     measured: Real
     error: Real
     drawing: Groove
-    solved: Callable[[Groove, Real], Real]
-    modelled: Callable[[Groove, Real], Real]
+    period: float
+    solved: Callable[[Profile, Real], Real]
+    modelled: Callable[[Profile, Real], Real]
     path: float = 2.0
     like: Case | None = None
 
     def predicted(self, method: str, groove: Groove, step: int = 1) -> Real:
         """Return the efficiencies by `solved` or `modelled`, less what roughness scatters."""
         wavelengths = self.wavelengths[::step]
-        smooth = getattr(self, method)(groove, wavelengths)
+        smooth = getattr(self, method)(groove.profile(self.period), wavelengths)
         left = [groove.specular(lam, self.path) for lam in wavelengths]
         return np.asarray(smooth * left)
 
@@ -153,18 +156,11 @@ def reflection_gratings() -> list[Case]:
     for name, (lines, blaze) in _GMOS.items():
         period = 1e3 / lines
         facet = float(np.degrees(np.arcsin(0.5e-6 * blaze / _MOUNT * lines)))
-
-        def solved(groove: Groove, lam: Real, period: float = period) -> Real:
-            solver = predict.littrow_solver(groove.profile(period))
-            return predict.littrow_solved(solver, period, "Al", lam)
-
-        def modelled(groove: Groove, lam: Real, period: float = period) -> Real:
-            return predict.littrow_modelled(groove.profile(period), "Al", lam)
-
         cases.append(
             Case(
                 f"GMOS {name.split('_')[0]}, {lines}/mm", "Richardson", rows["wavelength_nm"] * 1.0,
-                rows[name], np.zeros(len(rows)), Groove(facet), solved, modelled,
+                rows[name], np.zeros(len(rows)), Groove(facet), period,
+                partial(predict.littrow_solved, "Al"), partial(predict.littrow_modelled, "Al"),
             )
         )  # fmt: skip
     return cases
@@ -180,19 +176,12 @@ def transmission_gratings() -> list[Case]:
 
     def case(laboratory: str, outwards: bool, like: Case | None = None, n: float = GLASS) -> Case:
         chosen = rows[rows["laboratory"] == laboratory]
-
-        def solved(groove: Groove, lam: Real) -> Real:
-            solver = predict.through_solver(groove.profile(period))
-            return predict.through_solved(solver, period, n, lam, outwards)
-
-        def modelled(groove: Groove, lam: Real) -> Real:
-            return predict.through_modelled(groove.profile(period), n, lam, outwards)
-
         side = ("glass to air" if outwards else "air to glass") + (f", n = {n}" if like else "")
         return Case(
             f"Thorlabs 300/mm, {side}", laboratory, chosen["wavelength_nm"],
-            chosen["efficiency"], chosen["error"], Groove(_THOR), solved, modelled,
-            n - 1.0, like,
+            chosen["efficiency"], chosen["error"], Groove(_THOR), period,
+            partial(predict.through_solved, n, outwards),
+            partial(predict.through_modelled, n, outwards), n - 1.0, like,
         )  # fmt: skip
 
     bench = case("LPNHE", True)
@@ -208,5 +197,4 @@ def write_fits() -> None:
         for count, groove in case.fit().items() if not case.like else ():
             values = ",".join(f"{value:.2f}" for value in groove[:3])
             lines.append(f"{case.name.replace(',', ';')},{count},{values}")
-    with atomic_path(FITTED) as temporary:
-        temporary.write_text(header + "\n".join(lines) + "\n", encoding="utf-8")
+    write_text(FITTED, header + "\n".join(lines) + "\n")

@@ -6,13 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.orders.solve.profiles import Profile
 
 # samples of a rounded profile
 _SAMPLES = 1600
-# pixels of a period for the model
-_PIXELS = 512
 
 
 class Groove(NamedTuple):
@@ -52,12 +49,3 @@ class Groove(NamedTuple):
         mirror in light along its normal.
         """
         return float(np.exp(-((2.0 * np.pi * path * self.roughness / wavelength) ** 2)))
-
-
-def heights_of(profile: Profile) -> HeightField:
-    """Return one period of a profile as heights for the model."""
-    places = (np.arange(_PIXELS) + 0.5) / _PIXELS * profile.period
-    x, z = profile.closed
-    row = np.interp((places - x[0]) % profile.period + x[0], x, z)
-    pixel = profile.period / _PIXELS
-    return HeightField(np.stack([row] * 2), pixel, name=profile.name, periodic=True)

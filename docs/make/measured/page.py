@@ -75,13 +75,12 @@ class Comparisons:
         prism = shapes.PRISM.profile(shapes.TRANSMITTING)
         mirror = shapes.MIRROR.profile(shapes.REFLECTING)
         back = [
-            predict.littrow_solved(solver, shapes.REFLECTING, "Al", lam)
-            for solver in (predict.littrow_solver(mirror), IntegralSolver(mirror, 240))
+            predict.littrow_solved("Al", mirror, lam, solver)
+            for solver in (None, IntegralSolver(mirror, 240))
         ]
-        ways = predict.through_solver(prism), CoupledWaves(prism, 25)
         through = [
-            predict.through_solved(way, shapes.TRANSMITTING, cases.GLASS, lam, False)
-            for way in ways
+            predict.through_solved(cases.GLASS, False, prism, lam, solver)
+            for solver in (None, CoupledWaves(prism, 25))
         ]
         return float(np.abs(np.subtract(*back)).max()), float(np.abs(np.subtract(*through)).max())
 

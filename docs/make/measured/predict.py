@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.validation.light import heights_of, light_of, powers_of
 from docs.make.validation.model import efficiencies, in_plane
-from docs.make.validation.published import light_of
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
@@ -17,8 +17,6 @@ from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile
 from mitsuba_diffraction.orders.solve.stations import Solver, Station
-
-from .grooves import heights_of
 
 Real = NDArray[np.float64]
 
@@ -40,23 +38,20 @@ def mirror_reflectance(material: str, wavelengths: Real) -> Real:
     return np.asarray(np.abs((index - 1) / (index + 1)) ** 2)
 
 
-def littrow_solver(profile: Profile) -> Solver:
-    """Return Chandezon's method with harmonics for the visible."""
-    return Chandezon(profile, 10 + round(1.6 * profile.period))
-
-
-def littrow_solved(solver: Solver, period: float, material: str, wavelengths: Real) -> Real:
-    """Order −1 that returns along its own light, by a solver."""
+def littrow_solved(
+    material: str, profile: Profile, wavelengths: Real, solver: Solver | None = None
+) -> Real:
+    """Order −1 that returns along its own light, by Chandezon's method or another solver."""
+    solver = solver or Chandezon(profile, 10 + round(1.6 * profile.period))
     values = []
     for lam in wavelengths:
-        sine = 0.5e-3 * lam / period
-        light = light_of(period, 1e-3 * lam, index_of(material, lam), sine, _ALONG)
-        powers = np.abs(solver.amplitudes(light.station)[0, light.channel]) ** 2
-        values.append(powers.mean(axis=0).sum(axis=-1)[light.channel + 1])
+        sine = 0.5e-3 * lam / profile.period
+        light = light_of(profile.period, 1e-3 * lam, index_of(material, lam), sine, _ALONG)
+        values.append(powers_of(solver, light)[-1].mean())
     return np.array(values)
 
 
-def littrow_modelled(profile: Profile, material: str, wavelengths: Real) -> Real:
+def littrow_modelled(material: str, profile: Profile, wavelengths: Real) -> Real:
     """Order −1 that returns along its own light, by the model."""
     field, values = heights_of(profile), []
     for lam in wavelengths:
@@ -74,8 +69,8 @@ def normal_pair(profile: Profile, material: str, wavelengths: Real) -> tuple[Rea
     for lam in wavelengths:
         index = index_of(material, lam)
         light = light_of(profile.period, 1e-3 * lam, index, 1e-9, _ALONG)
-        powers = np.abs(solver.amplitudes(light.station)[0, light.channel, 1]) ** 2
-        solved.append(powers[[light.channel - 1, light.channel + 1]].sum())
+        powers = powers_of(solver, light)
+        solved.append(powers[-1][1] + powers[1][1])
         wo = in_plane(1e-3 * lam / profile.period * np.array([-1.0, 1.0]))
         light_in = in_plane(0.0), wo, lam, _MODEL
         modelled.append(efficiencies(field, index, *light_in, sigma=profile.period).sum())
@@ -87,15 +82,18 @@ def face(index: float) -> float:
     return 1.0 - ((index - 1.0) / (index + 1.0)) ** 2
 
 
-def through_solver(profile: Profile) -> Solver:
-    """Return the integral method, which has light from within, as fine as 1e-3 needs."""
-    return IntegralSolver(profile, 120)
-
-
 def through_solved(
-    solver: Solver, period: float, index: float, wavelengths: Real, outwards: bool
+    index: float,
+    outwards: bool,
+    profile: Profile,
+    wavelengths: Real,
+    solver: Solver | None = None,
 ) -> Real:
-    """Order −1 of light along the normal through the grooves; outwards : from glass into air."""
+    """Order −1 of light along the normal through the grooves; outwards : from glass into air.
+
+    solver : by default the integral method, as fine as 1e-3 needs.
+    """
+    solver, period = solver or IntegralSolver(profile, 120), profile.period
     values = []
     for lam in 1e-3 * wavelengths:
         extent = 2.0 * period / lam
@@ -111,7 +109,7 @@ def through_solved(
     return np.array(values) * face(index)
 
 
-def through_modelled(profile: Profile, index: float, wavelengths: Real, outwards: bool) -> Real:
+def through_modelled(index: float, outwards: bool, profile: Profile, wavelengths: Real) -> Real:
     """Order −1 of light along the normal through the grooves, by the model."""
     field, values = heights_of(profile), []
     for lam in wavelengths:

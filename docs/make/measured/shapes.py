@@ -62,15 +62,16 @@ def effects(quick: bool = False) -> dict[str, tuple[Effect | None, Effect | None
 
 
 def _reflected(groove: Groove) -> Real:
-    solver = IntegralSolver(groove.profile(REFLECTING), 160)
+    profile = groove.profile(REFLECTING)
     left = [groove.specular(lam, 2.0) for lam in _WAVELENGTHS]
-    return predict.littrow_solved(solver, REFLECTING, "Al", _WAVELENGTHS) * left
+    solver = IntegralSolver(profile, 160)
+    return predict.littrow_solved("Al", profile, _WAVELENGTHS, solver) * left
 
 
 def _transmitted(groove: Groove, index: float = GLASS) -> Real:
-    solver = predict.through_solver(groove.profile(TRANSMITTING))
     left = [groove.specular(lam, index - 1.0) for lam in _WAVELENGTHS]
-    return predict.through_solved(solver, TRANSMITTING, index, _WAVELENGTHS, True) * left
+    profile = groove.profile(TRANSMITTING)
+    return predict.through_solved(index, True, profile, _WAVELENGTHS) * left
 
 
 def _oxidised(bare: Real) -> Real:

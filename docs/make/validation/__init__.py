@@ -1,7 +1,7 @@
 """Comparison of the model with rigorous solutions, closed forms and statistics.
 
-Users of the package do not need it. `python -m docs.make.validation report` writes the pages from
-the solutions in data/; `solve`, `patches`, `coated` and `films` compute these, with the extra
+Users of the package do not need it. `python -m docs.make.validation` writes the pages from the
+solutions in data/; `python -m docs.make.validation.solve` computes these, with the extra
 `validation`.
 
 Contents
@@ -9,7 +9,7 @@ Contents
 cases            gratings, lights and materials
 integral         rigorous solver: boundary integrals
 coupled_wave     rigorous solver: coupled waves in layers
-solve            solutions of all gratings, by both
+solve            all solutions of data/, computed by one command
 solutions        files of solutions
 agreement        the two solvers beside each other
 patches          surfaces in two dimensions, in any plane of incidence
@@ -29,6 +29,7 @@ closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 orders           tables of solved orders, beside solvers that did not make them
 published        solvers beside printed efficiencies
+light            light on a grating, and its orders by a solver of the package
 scans            hues of gratings and crops of a rough surface, through windows
 tapers           width of lobes against colours, for tapers of these windows
 statistics       checks with random surfaces, and windows at random places

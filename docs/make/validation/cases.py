@@ -36,8 +36,13 @@ PROBE_WAVELENGTHS = tuple(float(w) for w in range(450, 781, 30))
 #: Aluminium's index n + ik by wavelength (nm): Mitsuba's own table (material `Al`), interpolated.
 ALUMINIUM = {460.0: 0.646 + 5.590j, 610.0: 1.248 + 7.368j}
 
+#: Silicon's index by wavelength (nm): Mitsuba's own table (material `Si`), interpolated.
+SILICON = {460.0: 4.577 + 0.130j, 610.0: 3.906 + 0.022j}
+
 #: Keratin's index, the middle of what is reported for hair and scales (1.54–1.58).
 KERATIN = 1.56
+
+_METALS = {"aluminium": ALUMINIUM, "silicon": SILICON}
 
 #: Polycarbonate's index, the coat of a CD.
 COAT = 1.58
@@ -62,17 +67,13 @@ class Grating:
         DiffractionError
             If there is no such profile.
         """
-        lengths = (self.period, self.depth)
-        if self.profile == "sinusoidal":
-            return gratings.sinusoidal(*lengths, periods=1, pixels_per_period=pixels, rows=2)
-        if self.profile == "lamellar":
-            return gratings.lamellar(*lengths, periods=1, pixels_per_period=pixels, rows=2)
-        if self.profile == "blazed":
-            return gratings.blazed(
-                *lengths, direction="ascending", periods=1, pixels_per_period=pixels, rows=2
+        if self.profile not in PROFILES:
+            raise DiffractionError(
+                f"profile '{self.profile}' is unknown; choose one of {', '.join(PROFILES)}"
             )
-        raise DiffractionError(
-            f"profile '{self.profile}' is unknown; choose one of {', '.join(PROFILES)}"
+        ascends = {"direction": "ascending"} if self.profile == "blazed" else {}
+        return getattr(gratings, self.profile)(
+            self.period, self.depth, periods=1, pixels_per_period=pixels, rows=2, **ascends
         )
 
     def __str__(self) -> str:
@@ -105,13 +106,23 @@ def scans(material: str) -> list[Scan]:
 
 
 def index_of(material: str, wavelength: float) -> complex:
-    """Index n + ik of a material at a wavelength (nm) of its scans.
+    """Index n + ik of a material at a wavelength (nm).
 
     Under polycarbonate both are those inside: the index is over the coat's.
     """
     if material == "aluminium under polycarbonate":
-        return ALUMINIUM[round(wavelength * COAT, 6)] / COAT
-    return KERATIN + 0j if material == "keratin" else ALUMINIUM[wavelength]
+        return index_of("aluminium", wavelength * COAT) / COAT
+    if material == "keratin":
+        return complex(KERATIN)
+    nodes = _METALS[material]  # Mitsuba's tables are smooth between them
+    return complex(np.interp(wavelength, list(nodes), list(nodes.values())))
+
+
+def index_text(material: str) -> str:
+    """Return the index of a material in words, for files of solutions."""
+    if material not in _METALS:
+        return f"{KERATIN:g}" if material == "keratin" else "perfect conductor"
+    return ", ".join(f"{n:g} at {w:g} nm" for w, n in _METALS[material].items())
 
 
 def _scans(material: str) -> Iterator[Scan]:

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .compare import GRAZING
+from .cases import index_of
+from .compare import GRAZING, misplaced
 from .model import efficiencies, jones_of, shares
 from .patch_solutions import Solved, solved
-from .patches import KINDS, PatchCase, cell, patch_index
+from .patches import KINDS, PatchCase, cell
 
 _MODELS = ("kirchhoff", "small_slope_alone", "small_slope")
 _POLARISED = ("kirchhoff", "small_slope")
@@ -40,6 +40,19 @@ def compared(material: str, kinds: Sequence[str] = KINDS) -> list[PatchCompariso
     ]
 
 
+def chosen(
+    comparisons: Sequence[PatchComparison], kinds: Sequence[str], slope: float, material: str
+) -> list[PatchComparison]:
+    """Return those of surfaces of some kinds, a slope and a material."""
+    return [
+        c
+        for c in comparisons
+        if c.case.surface.kind in kinds
+        and c.case.surface.slope == slope
+        and c.case.material == material
+    ]
+
+
 @dataclass(frozen=True)
 class PatchAgreement:
     """Both solvers on one case: their deviation of colours, and what either still changed."""
@@ -63,16 +76,15 @@ def agreements() -> list[PatchAgreement]:
             for solved_by in (first, other)
         )
         coloured = [number for number in powers if number != (0, 0)]
-        truth = sum(powers[number] for number in coloured)
-        deviation = sum(abs(powers[number] - others[number]) for number in coloured) / truth
+        truth, values = (np.array([of[n] for n in coloured]) for of in (powers, others))
         changes = (
             float(
                 solved_by.rows["change"][[number != (0, 0) for number in _numbers(solved_by)]].sum()
-                / truth
+                / truth.sum()
             )
             for solved_by in (first, other)
         )
-        compared.append(PatchAgreement(first.case, float(deviation), *changes))
+        compared.append(PatchAgreement(first.case, misplaced(values, truth), *changes))
     return compared
 
 
@@ -83,24 +95,20 @@ def _numbers(solution: Solved) -> list[tuple[int, int]]:
 def _compare(solution: Solved) -> PatchComparison:
     case, field = solution.case, cell(solution.case.surface)
     wi, wo = solution.wi, solution.wo(field)
-    index = patch_index(case.material, case.wavelength)
+    index = index_of(case.material, case.wavelength)
     coloured = (solution.rows["mx"] != 0) | (solution.rows["my"] != 0)
     keep = coloured & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
     truth = solution.efficiency(field)[keep]
     light, sigma = (field, index, wi, wo, case.wavelength), max(field.extent)  # lobes are separate
     powers = {model: efficiencies(*light, model, sigma=sigma)[keep] for model in _MODELS}
-    by_model = {model: _deviation(power, truth) for model, power in powers.items()}
+    by_model = {model: misplaced(power, truth) for model, power in powers.items()}
     exact = np.sum(np.abs(solution.rows["jones"]) ** 2, axis=1) * (wo[:, 2] / wi[2])[:, None]
     polarised = {}
     for model in _POLARISED:
         jones = jones_of(*light, model)
         power = powers[model][:, None] * shares(jones)[keep]
-        s, p = (_deviation(power[:, n], exact[keep, n]) for n in range(2))
+        s, p = (misplaced(power[:, n], exact[keep, n]) for n in range(2))
         polarised[model] = (s, p)
     return PatchComparison(
         case, by_model, polarised, float(solution.rows["change"][keep].sum() / truth.sum())
     )
-
-
-def _deviation(power: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
-    return float(np.abs(power - truth).sum() / truth.sum())

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import jv
 
-from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
+from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, kirchhoff_factor, wavenumber
 from mitsuba_diffraction.tables.lookup import window_sum
 from mitsuba_diffraction.tables.table import DiffractionTable
 
 from .cases import WAVELENGTHS, Grating, order_sines
-from .model import LOBE_SIGMA, in_plane, lobe_peaks
+from .model import LOBE_SIGMA, in_plane
 
 #: Angles of incidence, and the largest angle of an order, degrees.
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
@@ -79,7 +79,8 @@ def deviations(grating: Grating, pixels: int = 512) -> Deviations:
             # the BRDF at a lobe's centre is factor · 4π²σ⁴ |a_m|²
             unit = 4 * np.pi**2 * LOBE_SIGMA**4
             scale = kirchhoff_factor(wi, wo, wavelength, LOBE_SIGMA) * unit
-            peaks = lobe_peaks(grating, wi, wo, wavelength, pixels) / scale
+            width = WIDTHS_PER_SIGMA * LOBE_SIGMA
+            peaks = reference.brdf(strip, wi, wo, wavelength, coherence_width=width) / scale
             looked_up = window_sum(table, 2 * np.pi * orders / grating.period, 0.0, kappa)
             worst_integral = max(worst_integral, float(np.max(np.abs(peaks - exact))))
             worst_table = max(worst_table, float(np.max(np.abs(looked_up - exact))))

@@ -13,23 +13,20 @@ In the plane across the grooves s and p light stay apart, and this is exact for 
 
 from __future__ import annotations
 
-import datetime
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.progress import Progress, silent
 from mitsuba_diffraction.reference.fresnel import amplitudes
 
 from . import integral, rayleigh
-from .cases import ALUMINIUM, COAT, FEW_WAVELENGTHS, PROFILES, Grating, Scan, index_of, order_sines
+from .cases import COAT, FEW_WAVELENGTHS, Grating, Scan, index_of, index_text, order_sines
 from .compare import compare
 from .model import LOBE_SIGMA, efficiencies, in_plane, jones_of, shares
-from .solutions import ROW, Solutions, load, save_rows
+from .solutions import LIGHTS, Work, order_rows, stored
 
 Real = NDArray[np.float64]
 
@@ -50,37 +47,29 @@ ANGLES = (0.0, 30.0, 60.0)
 MATERIAL = "aluminium under polycarbonate"
 #: Without what the face sends back to the structure, and with it.
 SERIES = ("single", "bounced")
+#: Name of the file of one of `SERIES`, without its suffix.
+FILE = "aluminium_coated_{}"
 
 # (first, final) of the solvers: harmonics; points on the boundary
 _HARMONICS = (31, 61)
 
 
-def coated_file(series: str) -> str:
-    """Name of the file of solutions of one of `SERIES`."""
-    return f"aluminium_coated_{series}.npz"
+def work() -> Work:
+    """Return all `GRATINGS`, each of which is solved for all `SERIES`."""
+    about = {
+        "solver": f"{rayleigh.name()}; lamellar and blazed: {integral.name()}",
+        "index": index_text("aluminium"),
+    }
+    media = f"aluminium under a coat of index {COAT:g}"
+    return Work(
+        list(itertools.product(GRATINGS, ANGLES, FEW_WAVELENGTHS)),
+        _by_file,
+        {FILE.format(series): about | {"material": f"{media}, {series}"} for series in SERIES},
+    )
 
 
-def solve_coated(folder: Path, progress: Progress | None = None) -> dict[str, NDArray[np.void]]:
-    """Solve all `GRATINGS` for each of `SERIES`, and write the rows to files after each grating.
-
-    Raises
-    ------
-    DiffractionError
-        If gratinglab is not installed, or a file cannot be written.
-    """
-    tell = progress or silent
-    by_series = {series: np.empty(0, ROW) for series in SERIES}
-    for n, grating in enumerate(GRATINGS):
-        tell(n, len(GRATINGS), f"solving {grating} under a coat")
-        for theta in ANGLES:
-            for wavelength in FEW_WAVELENGTHS:
-                rows = solve_one(grating, theta, wavelength)
-                for series in SERIES:
-                    by_series[series] = np.concatenate([by_series[series], rows[series]])
-        for series in SERIES:
-            save_rows(by_series[series], _about(series), folder / coated_file(series))
-    tell(len(GRATINGS), len(GRATINGS), "done")
-    return by_series
+def _by_file(case: tuple[Grating, float, float]) -> dict[str, NDArray[np.void]]:
+    return {FILE.format(series): rows for series, rows in solve_one(*case).items()}
 
 
 def solve_one(grating: Grating, theta: float, wavelength: float) -> dict[str, NDArray[np.void]]:
@@ -92,22 +81,17 @@ def solve_one(grating: Grating, theta: float, wavelength: float) -> dict[str, ND
         _matrices(grating, theta, wavelength, inside, fine=fine) for fine in (False, True)
     )
     cosine = np.sqrt(1 - sines**2)
-    rows = {}
-    for series in SERIES:
-        part = np.zeros(len(orders), ROW)
-        part["profile"] = PROFILES.index(grating.profile)
-        part["period"], part["depth"] = grating.period, grating.depth
-        part["theta"], part["wavelength"], part["order"] = theta, wavelength, orders
-        for n, light in enumerate(("te", "tm")):
-            face = np.abs(amplitudes(cosine, COAT)[n]) ** 2
-            coarse, fine_ones = (
-                leaving(matrix[n], face, outside, orders, series=series)
-                for matrix in (first, final)
-            )
-            part[light], part[f"{light}_change"] = fine_ones, np.abs(fine_ones - coarse)
-            part[f"{light}_balance"] = np.nan
-        rows[series] = part
-    return rows
+    faces = np.abs(amplitudes(cosine, COAT)) ** 2
+    return {
+        series: order_rows(
+            grating, theta, wavelength,
+            *(
+                [leaving(each[n], faces[n], outside, orders, series=series) for n in range(2)]
+                for each in (first, final)
+            ),
+        )
+        for series in SERIES
+    }  # fmt: skip
 
 
 def leaving(
@@ -154,13 +138,15 @@ class CoatDeviation:
 
 def deviations(gratings: Sequence[Grating] = GRATINGS) -> list[CoatDeviation]:
     """Compare the default with the stored solutions of these gratings."""
-    stored = {series: shipped_coated(series) for series in SERIES}
+    solved = [stored(FILE.format(series)) for series in SERIES]
     compared = []
     for grating in gratings:
         for theta in ANGLES:
             single, bounced = (
-                compare("aluminium", _of(part, grating, theta), "small_slope", COAT)
-                for part in stored.values()
+                compare(
+                    "aluminium", each.where(grating=grating, theta=theta), "small_slope", coat=COAT
+                )
+                for each in solved
             )
             once = np.concatenate([_once(grating, theta, w) for w in FEW_WAVELENGTHS])
             coloured = bounced.counted & (bounced.solutions.rows["order"] != 0)
@@ -174,18 +160,6 @@ def deviations(gratings: Sequence[Grating] = GRATINGS) -> list[CoatDeviation]:
             )
             compared.append(deviation)
     return compared
-
-
-def shipped_coated(series: str) -> Solutions:
-    """Stored solutions of one of `SERIES`."""
-    with resources.as_file(resources.files(__package__) / "data" / coated_file(series)) as path:
-        return load(path)
-
-
-def _of(part: Solutions, grating: Grating, theta: float) -> Solutions:
-    return part.where(
-        profile=grating.profile, period=grating.period, depth=grating.depth, theta=theta
-    )
 
 
 def _once(grating: Grating, theta: float, wavelength: float) -> Real:
@@ -243,15 +217,5 @@ def _reflected(
     scan = Scan(grating, MATERIAL, float(np.degrees(np.arcsin(sine))), (wavelength,))
     solution = integral.solve(scan, integral.resolutions(scan)[fine])
     orders, _ = order_sines(grating.period, wavelength, scan.theta)
-    powers = np.stack([solution.orders[light][0] for light in ("te", "tm")], axis=1)
+    powers = np.stack([solution.orders[light][0] for light in LIGHTS], axis=1)
     yield from zip(orders.tolist(), powers, strict=True)
-
-
-def _about(series: str) -> dict[str, object]:
-    return {
-        "command": "python -m docs.make.validation coated",
-        "date": datetime.date.today().isoformat(),
-        "solver": f"{rayleigh.name()}; lamellar and blazed: {integral.name()}",
-        "material": f"aluminium under a coat of index {COAT:g}, {series}",
-        "index": ", ".join(f"{n:g} at {w:g} nm" for w, n in ALUMINIUM.items()),
-    }

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from .cases import PROFILES, Grating, order_sines
 from .model import order_efficiencies, order_shares
-from .solutions import KEY, Solutions, shipped
+from .solutions import KEY, LIGHTS, Solutions, shipped
 
 #: Orders that leave closer to the surface than this are not counted: the model has no limit there.
 GRAZING = 75.0  # degrees
@@ -53,7 +53,7 @@ class Comparison:
         return Comparison(self.material, part, self.model[keep], self.by_light[keep])
 
     def where(self, **values: Any) -> Comparison:
-        """The rows with these values, such as profile="lamellar" or theta=30.0."""
+        """The rows with these values, as `Solutions.where`."""
         return self.select(self.solutions.having(**values))
 
     def deviation(self, *, colours: bool = False, light: str | None = None) -> float:
@@ -65,10 +65,9 @@ class Comparison:
         keep = self.counted & (self.solutions.rows["order"] != 0) if colours else self.counted
         model, exact = self.model, self.rigorous
         if light is not None:
-            model = self.by_light[:, ("te", "tm").index(light)]
+            model = self.by_light[:, LIGHTS.index(light)]
             exact = self.solutions.rows[light].astype(float)
-        total = float(exact[keep].sum())
-        return float(np.abs(model - exact)[keep].sum()) / total if total else np.nan
+        return misplaced(model, exact, keep)
 
     def change(self) -> float:
         """Change by the last refinement of the solver, in the measure of `deviation` of colours."""
@@ -87,15 +86,25 @@ class Comparison:
         return float(self.model.sum() / self.rigorous.sum())
 
 
+def misplaced(
+    values: NDArray[np.float64],
+    exact: NDArray[np.float64],
+    keep: NDArray[np.bool_] | slice = slice(None),
+) -> float:
+    """Return Σ|values − exact| / Σ exact over the rows that are kept; NaN without light in them."""
+    total = float(exact[keep].sum())
+    return float(np.abs(values - exact)[keep].sum()) / total if total else np.nan
+
+
 def compare(
     material: str,
     solutions: Solutions | None = None,
     model: str = "kirchhoff",
-    coat: float | None = None,
+    **layer: Any,
 ) -> Comparison:
     """Evaluate a model (`model.MODELS`) for the converged solutions, by default the stored ones.
 
-    coat : index of a coat over the gratings; `by_light` is NaN then.
+    layer : over the gratings, `coat` or `film` of `reference.brdf`; `by_light` is NaN then.
 
     Raises
     ------
@@ -107,10 +116,10 @@ def compare(
     unpolarised, lights = np.full(len(rows), np.nan), np.full((len(rows), 2), np.nan)
     for grating, theta, wavelength, members in scans_of(rows):
         orders, _ = order_sines(grating.period, wavelength, theta)
-        efficiencies = order_efficiencies(grating, material, theta, wavelength, model, coat)
+        efficiencies = order_efficiencies(grating, material, theta, wavelength, model, **layer)
         place = np.searchsorted(orders, rows["order"][members])
         unpolarised[members] = efficiencies[place]
-        if coat is None:
+        if not layer:
             share = order_shares(grating, material, theta, wavelength, model)
             lights[members] = (efficiencies[:, None] * share)[place]
     return Comparison(material, trusted, unpolarised, lights)
@@ -153,9 +162,7 @@ def table_of(
     """A measure for each grating and angle, (gratings, angles); NaN where nothing was solved."""
     result = np.full((len(gratings), len(angles)), np.nan)
     for row, grating in enumerate(gratings):
-        of_grating = comparison.where(
-            profile=grating.profile, period=grating.period, depth=grating.depth
-        )
+        of_grating = comparison.where(grating=grating)
         for column, theta in enumerate(angles):
             part = of_grating.where(theta=theta)
             if len(part.model):

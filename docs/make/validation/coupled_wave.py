@@ -7,20 +7,15 @@ for TM on a metallic staircase it does not, so that is not asked of it.
 
 from __future__ import annotations
 
-import contextlib
-import importlib.metadata
-import importlib.util
-import os
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.streams import own_program, without_chatter
 
 from .cases import Scan, index_of, order_sines
-from .solutions import Efficiencies
+from .solutions import Efficiencies, imported, version
 
 #: (highest Fourier order, layers of the staircase): first and finally.
 STAIRCASE = ((12, 40), (24, 80))
@@ -30,12 +25,7 @@ LAMELLAR = ((60, 1), (120, 1))
 
 def name() -> str:
     """The solver's name and version."""
-    return f"pySCATMECH {importlib.metadata.version('pySCATMECH')}, coupled waves"
-
-
-def available() -> bool:
-    """Whether pySCATMECH can be imported."""
-    return importlib.util.find_spec("pySCATMECH") is not None
+    return f"pySCATMECH {version('pySCATMECH')}, coupled waves"
 
 
 def can_solve(scan: Scan, polarisation: str) -> bool:
@@ -47,15 +37,7 @@ def can_solve(scan: Scan, polarisation: str) -> bool:
 
 
 def part_of(scans: Sequence[Scan]) -> list[Scan]:
-    """The scans to compare both solvers with: shallow and deep, narrow and wide, one wavelength.
-
-    Raises
-    ------
-    DiffractionError
-        If they are of a perfect conductor, which has no index.
-    """
-    if any(scan.material == "perfect" for scan in scans):
-        raise DiffractionError("coupled waves need an index: solve 'aluminium' or 'keratin'")
+    """The scans to compare both solvers with: shallow and deep, narrow and wide, one wavelength."""
     return [
         replace(scan, wavelengths=scan.wavelengths[-1:])
         for scan in scans
@@ -82,17 +64,12 @@ def solve(scan: Scan, resolution: tuple[int, int]) -> Efficiencies:
     DiffractionError
         If pySCATMECH is not installed.
     """
-    try:
-        from pySCATMECH.rcw import RCW_Model
-    except ImportError as error:
-        raise DiffractionError(
-            "pySCATMECH is not installed; install the extra: pip install '.[validation]'"
-        ) from error
+    model_of = imported("pySCATMECH.rcw").RCW_Model
     result = Efficiencies(len(scan.wavelengths))
     for wavelength in scan.wavelengths:
         orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
-        with _quiet():
-            model = RCW_Model(_parameters(scan, wavelength, resolution))
+        with own_program(), without_chatter():  # it reports every layer
+            model = model_of(_parameters(scan, wavelength, resolution))
             matrices = np.array([np.array(model.DiffractionEfficiency(int(m))) for m in orders])
         # Mueller matrices: with grooves across the plane of incidence, s is TE
         for polarisation, sign in (("te", 1), ("tm", -1)):
@@ -138,17 +115,3 @@ _KINDS = {
     "lamellar": "Single_Line_Grating",
     "blazed": "Triangular_Grating",
 }
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """The library reports every layer on stderr, past Python's own stream."""
-    sys.stderr.flush()
-    stderr = os.dup(2)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        yield
-    finally:
-        os.dup2(stderr, 2)
-        os.close(stderr)

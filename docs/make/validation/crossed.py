@@ -9,8 +9,6 @@ the square of the layers' thickness; and the harmonics are those nearest to the 
 
 from __future__ import annotations
 
-import importlib.metadata
-import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.reference import boundary
+
+from .solutions import imported, version
 
 #: Orders closer to the horizon than this cosine are not returned.
 HORIZON = 0.01
@@ -45,12 +44,7 @@ class Orders:
 
 def name() -> str:
     """The solver's name and version."""
-    return f"grcwa {importlib.metadata.version('grcwa')}, coupled waves"
-
-
-def available() -> bool:
-    """Whether grcwa can be imported."""
-    return importlib.util.find_spec("grcwa") is not None
+    return f"grcwa {version('grcwa')}, coupled waves"
 
 
 def solve(
@@ -77,12 +71,7 @@ def solve(
     DiffractionError
         If grcwa is not installed.
     """
-    if not available():
-        raise DiffractionError(
-            "grcwa is not installed; install the extra: pip install '.[validation]'"
-        )
-    import grcwa
-
+    grcwa = imported("grcwa")
     lam = wavelength / 1000
     width, height = field.extent
     # grcwa's z points along the light: its frame is ours turned about x by half a turn

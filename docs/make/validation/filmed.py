@@ -13,25 +13,20 @@ of a wave (α_m, β) at the face z(x). Time exp(−iωt), lengths over 2π/λ.
 
 from __future__ import annotations
 
-import datetime
-from collections.abc import Iterator
+import itertools
 from dataclasses import dataclass, replace
-from importlib import resources
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.progress import Progress, silent
+from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.reference.fresnel import decaying_root
 
-from .cases import ALUMINIUM, FEW_WAVELENGTHS, KERATIN, PROFILES, Grating, order_sines
-from .compare import GRAZING
-from .model import LOBE_SIGMA, in_plane
-from .solutions import ROW, Solutions, load, save_rows
+from .cases import FEW_WAVELENGTHS, Grating, index_of, index_text, order_sines
+from .compare import Comparison, compare, table_of
+from .models import of_colours
+from .solutions import Solutions, Work, order_rows, stored
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -39,27 +34,25 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Stack:
-    """A film on a material; indices by wavelength (nm), thickness in nm."""
+    """A film on a material of `cases.index_of`; thickness in nm."""
 
     name: str
-    index: dict[float, complex]
+    material: str
     film: complex
     thickness: float
 
     @property
     def file(self) -> str:
-        """Name of the file of solutions."""
-        return f"film_{self.name.replace(' ', '_')}.npz"
+        """Name of the file of solutions, without its suffix."""
+        return f"film_{self.name.replace(' ', '_')}"
 
 
-#: Silicon's index by wavelength (nm): Mitsuba's own table (material `Si`), interpolated.
-SILICON = {460.0: 4.577 + 0.130j, 610.0: 3.906 + 0.022j}
 STACKS = (
-    Stack("wax on keratin", dict.fromkeys(FEW_WAVELENGTHS, KERATIN + 0j), 1.44, 150.0),
-    Stack("titania on keratin", dict.fromkeys(FEW_WAVELENGTHS, KERATIN + 0j), 2.4, 100.0),
-    Stack("oxide on silicon", SILICON, 1.46, 300.0),
-    Stack("oxide on aluminium", ALUMINIUM, 1.77, 250.0),
-    Stack("lacquer on aluminium", ALUMINIUM, 1.5 + 0.02j, 700.0),
+    Stack("wax on keratin", "keratin", 1.44, 150.0),
+    Stack("titania on keratin", "keratin", 2.4, 100.0),
+    Stack("oxide on silicon", "silicon", 1.46, 300.0),
+    Stack("oxide on aluminium", "aluminium", 1.77, 250.0),
+    Stack("lacquer on aluminium", "aluminium", 1.5 + 0.02j, 700.0),
 )
 #: Steepest slopes of 0.03, 0.06, 0.1 and 0.1: of two, narrow and wide.
 GRATINGS = tuple(
@@ -93,7 +86,7 @@ def _amplitudes(
     """Return the amplitudes of all orders, (2, n), and their q above."""
     m = np.arange(-harmonics, harmonics + 1)
     alpha = m * wavelength / 1000 / grating.period - sine
-    epsilons = 1.0, stack.film**2, stack.index[wavelength] ** 2
+    epsilons = 1.0, stack.film**2, index_of(stack.material, wavelength) ** 2
     above, within, below = (decaying_root(e - alpha**2 + 0j) for e in epsilons)
     heights = grating.heights(_PIXELS).heights[0] * float(wavenumber(wavelength))
     heights = heights - heights.mean()
@@ -130,50 +123,39 @@ def _projected(heights: Real, alpha: Real, beta: Complex, eta: complex) -> Compl
     return np.concatenate(rows)
 
 
-def solve_films(folder: Path, progress: Progress | None = None) -> list[Path]:
-    """Solutions of all `STACKS`, written to files.
-
-    Raises
-    ------
-    DiffractionError
-        If a file cannot be written.
-    """
-    tell = progress or silent
-    paths = []
-    for n, stack in enumerate(STACKS):
-        tell(n, len(STACKS), f"solving {stack.name}")
-        rows = np.concatenate([_rows(stack, *case) for case in _cases()])
-        paths.append(folder / stack.file)
-        save_rows(rows, _about(stack), paths[-1])
-    tell(len(STACKS), len(STACKS), "done")
-    return paths
+def work() -> Work:
+    """Return all `STACKS` on all `GRATINGS`."""
+    about = {
+        stack.file: {
+            "solver": name(),
+            "material": f"{stack.name}, film of {stack.film:g}, {stack.thickness:g} nm",
+            "index": index_text(stack.material),
+        }
+        for stack in STACKS
+    }
+    cases = list(itertools.product(STACKS, GRATINGS, ANGLES, FEW_WAVELENGTHS))
+    return Work(cases, _by_file, about)
 
 
-def shipped_film(stack: Stack) -> Solutions:
-    """Stored solutions of one of `STACKS`."""
-    with resources.as_file(resources.files(__package__) / "data" / stack.file) as path:
-        return load(path)
+def _by_file(case: tuple[Stack, Grating, float, float]) -> dict[str, NDArray[np.void]]:
+    return {case[0].file: _rows(*case)}
+
+
+def _rows(stack: Stack, grating: Grating, theta: float, wavelength: float) -> NDArray[np.void]:
+    both = (solve(grating, stack, theta, wavelength, n) for n in _HARMONICS)
+    return order_rows(grating, theta, wavelength, *both)
 
 
 def deviations(stack: Stack, model: str) -> Real:
-    """Σ|η − η_rigorous| / Σ η_rigorous of colours, (gratings, angles); orders within `GRAZING`."""
-    solutions = shipped_film(stack)
-    sums = np.zeros((2, len(GRATINGS), len(ANGLES)))
-    for grating, theta, wavelength in _cases():
-        orders, sines = order_sines(grating.period, wavelength, theta)
-        exact = solutions.where(
-            period=grating.period, depth=grating.depth, theta=theta, wavelength=wavelength
-        ).mean
-        counted = _counted(orders, sines)
-        off = np.abs(model_of(grating, stack, theta, wavelength, model) - exact)
-        place = GRATINGS.index(grating), ANGLES.index(theta)
-        sums[(0, *place)] += off[counted].sum()
-        sums[(1, *place)] += exact[counted].sum()
-    return np.asarray(sums[0] / sums[1])
+    """Deviations of colours from the stored solutions of a film, (gratings, angles)."""
+    return table_of(_compared(stack, stored(stack.file), model), GRATINGS, ANGLES, of_colours)
 
 
-@dataclass(frozen=True)
-class FilmDeviations:
+def _compared(stack: Stack, solutions: Solutions, model: str) -> Comparison:
+    return compare(stack.material, solutions, model, film=(stack.film, stack.thickness))
+
+
+class FilmDeviations(NamedTuple):
     """Deviations of colours under a film by both models, each (gratings, angles)."""
 
     stack: Stack
@@ -181,21 +163,9 @@ class FilmDeviations:
     default: Real
 
 
-def compare_models(stack: Stack) -> FilmDeviations:
+def of_stack(stack: Stack) -> FilmDeviations:
     """Compare both models with the stored solutions of a film."""
     return FilmDeviations(stack, deviations(stack, "kirchhoff"), deviations(stack, "small_slope"))
-
-
-def model_of(grating: Grating, stack: Stack, theta: float, wavelength: float, model: str) -> Real:
-    """The model's efficiencies of the orders, for unpolarised light."""
-    _, sines = order_sines(grating.period, wavelength, theta)
-    index = stack.index[wavelength]
-    brdf = reference.brdf(
-        grating.heights(), in_plane(np.sin(np.radians(theta))), in_plane(sines), wavelength,
-        coherence_width=WIDTHS_PER_SIGMA * LOBE_SIGMA, model=model,
-        eta=index.real, k=index.imag, film=(stack.film, stack.thickness),
-    )  # fmt: skip
-    return np.asarray(brdf * np.pi / (LOBE_SIGMA * float(wavenumber(wavelength))) ** 2)
 
 
 class Beyond(NamedTuple):
@@ -212,47 +182,7 @@ def beyond() -> list[Beyond]:
     compared = []
     for thickness, depth in ((700.0, 0.12), (1400.0, 0.05), (1400.0, 0.08)):
         stack, grating = replace(lacquer, thickness=thickness), Grating("sinusoidal", 2.5, depth)
-        off = light = 0.0
-        for wavelength in FEW_WAVELENGTHS:
-            exact = solve(grating, stack, theta, wavelength, _HARMONICS[-1]).mean(axis=0)
-            counted = _counted(*order_sines(grating.period, wavelength, theta))
-            found = model_of(grating, stack, theta, wavelength, "small_slope")
-            off += float(np.abs(found - exact)[counted].sum())
-            light += float(exact[counted].sum())
-        compared.append(Beyond(thickness, depth, off / light))
+        rows = np.concatenate([_rows(stack, grating, theta, lam) for lam in FEW_WAVELENGTHS])
+        found = _compared(stack, Solutions(rows, {}), "small_slope")
+        compared.append(Beyond(thickness, depth, of_colours(found)))
     return compared
-
-
-def _counted(orders: NDArray[np.int64], sines: Real) -> NDArray[np.bool_]:
-    """Which orders are colours."""
-    return np.asarray((orders != 0) & (np.abs(sines) <= np.sin(np.radians(GRAZING))))
-
-
-def _cases() -> Iterator[tuple[Grating, float, float]]:
-    for grating in GRATINGS:
-        for theta in ANGLES:
-            for wavelength in FEW_WAVELENGTHS:
-                yield grating, theta, wavelength
-
-
-def _rows(stack: Stack, grating: Grating, theta: float, wavelength: float) -> NDArray[np.void]:
-    coarse, fine = (solve(grating, stack, theta, wavelength, n) for n in _HARMONICS)
-    orders, _ = order_sines(grating.period, wavelength, theta)
-    rows = np.zeros(len(orders), ROW)
-    rows["profile"] = PROFILES.index(grating.profile)
-    rows["period"], rows["depth"] = grating.period, grating.depth
-    rows["theta"], rows["wavelength"], rows["order"] = theta, wavelength, orders
-    for n, light in enumerate(("te", "tm")):
-        rows[light], rows[f"{light}_change"] = fine[n], np.abs(fine - coarse)[n]
-        rows[f"{light}_balance"] = np.nan
-    return rows
-
-
-def _about(stack: Stack) -> dict[str, object]:
-    return {
-        "command": "python -m docs.make.validation films",
-        "date": datetime.date.today().isoformat(),
-        "solver": name(),
-        "material": f"{stack.name}, film of {stack.film:g}, {stack.thickness:g} nm",
-        "index": ", ".join(f"{n:g} at {w:g} nm" for w, n in stack.index.items()),
-    }

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cases import PROFILES, Grating
-from .cells import PatchComparison
+from .cells import PatchComparison, chosen
 from .compare import Comparison, angles_of, compare, gratings_of
 from .models import ANGLES, BANDS, banded, of_colours, within
 
@@ -126,13 +126,8 @@ class Cuts(NamedTuple):
 
 def cuts_of_scales(cells: Sequence[PatchComparison], model: str) -> Cuts | None:
     """Deviation on cuts of scales of keratin with slope 0.2; None where none are stored."""
-    deviations = [
-        c.by_model[model]
-        for c in cells
-        if c.case.surface.kind in ("elaphe", "elaphe_like")
-        and c.case.surface.slope == 0.2
-        and c.case.material == "keratin"
-    ]
+    scales = chosen(cells, ("elaphe", "elaphe_like"), 0.2, "keratin")
+    deviations = [c.by_model[model] for c in scales]
     return Cuts(float(np.mean(deviations)), max(deviations)) if deviations else None
 
 
@@ -148,30 +143,11 @@ def much_worse(sides: Sides, material: str) -> list[Case]:
     ]
 
 
-@dataclass(frozen=True)
-class AgainstKirchhoff:
-    """Gratings and angles of a material where the blend is better or worse than Kirchhoff.
-
-    Differences below the last refinement of the solver count as neither.
-    """
-
-    every: list[Case]
-    better: list[Case]
-    worse: list[Case]
-    worse_bands: list[Case]
-
-
-def against_kirchhoff(sides: Sides, material: str) -> AgainstKirchhoff:
-    """Compare the blend with Kirchhoff on every grating and angle of a material."""
+def with_half(sides: Sides, material: str) -> dict[str, Comparison]:
+    """Comparisons of one material by model, and by equal parts of both matrices."""
     models = models_of(sides, material)
-    models["half_and_half"] = compare(material, models["kirchhoff"].solutions, "half_and_half")
-    every = singles(models)
-    return AgainstKirchhoff(
-        every,
-        [case for case in every if case.gain > case.change],
-        [case for case in every if case.gain < -case.change],
-        [case for case in whole_bands(models) if case.gain < -case.change],
-    )
+    half = compare(material, models["kirchhoff"].solutions, "half_and_half")
+    return {**models, "half_and_half": half}
 
 
 def models_of(sides: Sides, material: str) -> dict[str, Comparison]:
@@ -202,8 +178,8 @@ def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Case]:
 def _case(
     models: Mapping[str, Comparison], label: str, theta: float, gratings: Sequence[Grating]
 ) -> Case:
-    parts = []
-    for grating in gratings:
-        chosen = {"profile": grating.profile, "period": grating.period, "depth": grating.depth}
-        parts.append({name: every.where(theta=theta, **chosen) for name, every in models.items()})
+    parts = [
+        {name: every.where(grating=grating, theta=theta) for name, every in models.items()}
+        for grating in gratings
+    ]
     return Case(label, theta, parts)

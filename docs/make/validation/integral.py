@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import importlib.util
 import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 
-from mitsuba_diffraction.errors import DiffractionError
-
 from .cases import Grating, Scan, index_of, order_sines
-from .solutions import Efficiencies
+from .solutions import LIGHTS, Efficiencies, imported, version
 
 #: Points on the boundary that a solution begins with, at least.
 POINTS = 200
@@ -28,12 +25,7 @@ _POINTS_PER_WAVELENGTH = 7
 
 def name() -> str:
     """The solver's name and version."""
-    return f"gratinglab {importlib.metadata.version('gratinglab')}, integral method"
-
-
-def available() -> bool:
-    """Whether gratinglab can be imported."""
-    return importlib.util.find_spec("gratinglab") is not None
+    return f"gratinglab {version('gratinglab')}, integral method"
 
 
 def solve(scan: Scan, boundary_points: int) -> Efficiencies:
@@ -49,14 +41,8 @@ def solve(scan: Scan, boundary_points: int) -> Efficiencies:
     DiffractionError
         If gratinglab is not installed.
     """
-    try:
-        from gratinglab.illumination import Illumination
-        from gratinglab.solvers.integral import integral
-    except ImportError as error:
-        raise DiffractionError(
-            "gratinglab is not installed; install the extra: pip install '.[validation]'"
-        ) from error
-
+    illumination = imported("gratinglab.illumination").Illumination
+    integral = imported("gratinglab.solvers.integral").integral
     options: dict[str, Any] = {
         "boundary_points": boundary_points,
         "corner_grading": 0 if scan.grating.profile == "sinusoidal" else _GRADING,
@@ -66,8 +52,8 @@ def solve(scan: Scan, boundary_points: int) -> Efficiencies:
         if coating:
             options["conductivity"] = "tabulated"
         problem = _problem(scan.grating, coating)
-        for polarisation in ("te", "tm"):
-            light = Illumination.classical(scan.theta, polarisation.upper())
+        for polarisation in LIGHTS:
+            light = illumination.classical(scan.theta, polarisation.upper())
             efficiencies = integral.solve(problem, light, scan.wavelengths, **options)
             for n, wavelength in enumerate(scan.wavelengths):
                 orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
@@ -130,14 +116,7 @@ def _material(scan: Scan) -> Iterator[str | None]:
         1 - np.pad(index.real, 1, mode="edge"),
         np.pad(index.imag, 1, mode="edge"),
     )
-    before = os.environ.get(materials.LIBRARY_ENV)
     with tempfile.TemporaryDirectory() as folder:
         materials.write_ari(table, Path(folder) / f"{scan.material}.ari")
-        os.environ[materials.LIBRARY_ENV] = folder
-        try:
+        with mock.patch.dict(os.environ, {materials.LIBRARY_ENV: folder}):
             yield scan.material
-        finally:
-            if before is None:
-                del os.environ[materials.LIBRARY_ENV]
-            else:
-                os.environ[materials.LIBRARY_ENV] = before

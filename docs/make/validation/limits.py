@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 from .cases import Grating
 from .compare import Comparison, angles_of, gratings_of, table_of
+from .models import of_colours
 
 #: Deviations that `validity.GENTLE_SLOPE` and `validity.STEEP_SLOPE` stand for.
 GENTLE_ERROR = 0.05
@@ -32,9 +33,7 @@ def worst_deviations(comparisons: Sequence[Comparison]) -> list[tuple[Grating, f
     for comparison in comparisons:
         sinusoids = gratings_of(comparison, "sinusoidal")
         angles = [theta for theta in angles_of(comparison) if 0 <= theta <= STEEPEST_LIGHT]
-        table = table_of(
-            comparison, sinusoids, angles, lambda part: part.deviation(colours=True)
-        ).max(axis=1)
+        table = table_of(comparison, sinusoids, angles, of_colours).max(axis=1)
         deviations += [
             (grating, rms_slope(grating), float(worst))
             for grating, worst in zip(sinusoids, table, strict=True)

@@ -16,6 +16,7 @@ R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffractio
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +27,7 @@ from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.reference import boundary
 from mitsuba_diffraction.reference import model as models
 
-from .cases import PIXELS, Grating, index_of, order_sines
+from .cases import Grating, index_of, order_sines
 
 #: σ (µm) of a window through which the lobes of gratings are separate, up to periods of 1 mm, and
 #: order 0's lies above the horizon: √(kσ) cosθ is above 20 up to 75°, so C of eq. 10 is 1.
@@ -42,7 +43,7 @@ def order_efficiencies(
     theta: float,
     wavelength: float,
     model: str = "kirchhoff",
-    coat: float | None = None,
+    **layer: Any,
 ) -> NDArray[np.float64]:
     """η_m of every propagating order, ordered as `cases.order_sines`, for unpolarised light.
 
@@ -53,13 +54,13 @@ def order_efficiencies(
     theta : angle of incidence, degrees.
     wavelength : nm.
     model : of `MODELS`.
-    coat : index of a coat over the grating, for models of `reference.MODELS`.
+    layer : `coat` or `film` of `reference.brdf`, for models of `reference.MODELS`.
     """
     _, sines = order_sines(grating.period, wavelength, theta)
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     index = None if material == "perfect" else index_of(material, wavelength)
     return efficiencies(
-        _period(grating), index, wi, wo, wavelength, model, sigma=LOBE_SIGMA, coat=coat
+        _period(grating), index, wi, wo, wavelength, model, sigma=LOBE_SIGMA, **layer
     )
 
 
@@ -72,7 +73,7 @@ def efficiencies(
     model: str,
     *,
     sigma: float,
-    coat: float | None = None,
+    **layer: Any,
 ) -> NDArray[np.float64]:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
@@ -90,7 +91,7 @@ def efficiencies(
     known = model if model in reference.MODELS else "kirchhoff"
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
-        coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
+        coherence_width=width, model=known, eta=index.real, k=index.imag, **layer,
     )  # fmt: skip
     if model == known:
         return brdf
@@ -155,29 +156,6 @@ def order_shares(
     index, field = index_of(material, wavelength), grating.heights()
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     return shares(jones_of(field, index, wi, wo, wavelength, model))
-
-
-def lobe_peaks(
-    grating: Grating,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    wavelength: float,
-    pixels: int = PIXELS,
-) -> NDArray[np.float64]:
-    """The BRDF (R = 1) at the centres of lobes, through a window of `LOBE_SIGMA`.
-
-    Parameters
-    ----------
-    wi, wo : (3,) and (n, 3), unit vectors away from the surface.
-    wavelength : nm.
-    pixels : a period.
-
-    Returns
-    -------
-    (n,) in 1/sr.
-    """
-    width = WIDTHS_PER_SIGMA * LOBE_SIGMA
-    return reference.brdf(grating.heights(pixels), wi, wo, wavelength, coherence_width=width)
 
 
 def in_plane(sine: ArrayLike) -> NDArray[np.float64]:

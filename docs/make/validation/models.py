@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from .cases import PROFILES, Grating
 from .compare import Comparison, compare, gratings_of, table_of
+from .solutions import LIGHTS
 
 #: Depth over period of the gratings that are averaged, from above the first to the second.
 BANDS = ((0.0, 0.03), (0.03, 0.08), (0.08, 0.13), (0.13, 0.4))
@@ -15,19 +17,10 @@ ANGLES = (0.0, 30.0, 60.0)
 MATERIALS = ("keratin", "aluminium")
 
 
-def of_colours(comparison: Comparison) -> float:
-    """Deviation of unpolarised colours."""
-    return comparison.deviation(colours=True)
-
-
-def of_te(comparison: Comparison) -> float:
-    """Deviation of colours in TE light: the electric field along the grooves."""
-    return comparison.deviation(colours=True, light="te")
-
-
-def of_tm(comparison: Comparison) -> float:
-    """Deviation of colours in TM light."""
-    return comparison.deviation(colours=True, light="tm")
+#: Deviation of colours: unpolarised, and with the electric field along the grooves or across.
+of_colours, of_te, of_tm = (
+    partial(Comparison.deviation, colours=True, light=light) for light in (None, *LIGHTS)
+)
 
 
 def banded(

@@ -18,17 +18,16 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
-from mitsuba_diffraction.orders.solve.stations import Grating, Solver, Station
+from mitsuba_diffraction.orders.solve.stations import Grating, Solver
 
-from .cases import PIXELS
+from .compare import GRAZING, misplaced
+from .light import Light, heights_of, light_of, light_on, powers_of
 from .model import LOBE_SIGMA, efficiencies
-from .published import light_of
 
 Real = NDArray[np.float64]
 
@@ -37,8 +36,7 @@ FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 TABLES = ("cd", "dvd", "blazed", "sinusoidal")
 MOUNTS = ((0, 0), (30, 0), (30, 50), (30, 90), (60, 0), (60, 50), (60, 90))
 WAVELENGTHS = (460.0, 530.0, 610.0)
-# orders beyond are left out, as in `compare`: an error of little light
-_HORIZON = np.cos(np.radians(75.0))
+_HORIZON = np.cos(np.radians(GRAZING))
 #: Harmonics on either side, of coupled waves and of Chandezon's method.
 COUPLED, CHANDEZON = 60, 20
 #: Wavelength of the efficiencies side by side, nm.
@@ -58,13 +56,19 @@ class Deviation(NamedTuple):
     sum: float
 
 
-class Efficiencies(NamedTuple):
-    """Efficiencies of an order by the default model, the table, and the solver beside."""
+class Row(NamedTuple):
+    """Efficiencies at one wavelength, (n,) each: orders, cosines, truth, model and table."""
 
-    order: int
-    model: float
-    table: float
-    truth: float
+    order: NDArray[np.int64]
+    cosine: Real
+    truth: Real
+    model: Real
+    table: Real
+
+    @property
+    def coloured(self) -> NDArray[np.bool_]:
+        """Orders but 0 within `GRAZING`."""
+        return (self.order != 0) & (self.cosine > _HORIZON)
 
 
 class Diffuse(NamedTuple):
@@ -106,12 +110,7 @@ class Case:
     @cached_property
     def field(self) -> HeightField:
         """Heights of one period."""
-        profile = self.recipe.profile
-        place = (np.arange(PIXELS) + 0.5) / PIXELS * profile.period
-        heights = np.interp(place, *profile.closed)
-        return HeightField(
-            np.stack([heights, heights]), profile.period / PIXELS, name=self.name, periodic=True
-        )
+        return heights_of(self.recipe.profile)
 
     def deviations(self, theta: float, phi: float) -> list[Deviation]:
         """Return the deviations of the default model and of the table.
@@ -119,31 +118,22 @@ class Case:
         theta, phi : of the light in air, degrees; a superstrate refracts it.
         """
         rows = [self._efficiencies(theta, phi, lam) for lam in WAVELENGTHS]
-        missed = np.array([[row.missed(row.model), row.missed(row.table)] for row in rows])
-        light = sum(row.light for row in rows)
-        sums = np.array(
-            [[abs(np.sum(m) - np.sum(row.truth)) for m in (row.model, row.table)] for row in rows]
-        )
-        if light < 1e-6:
-            light = np.nan  # no order but 0 propagates
+        coloured = np.concatenate([row.coloured for row in rows])
+        truth = np.concatenate([row.truth for row in rows])
         return [
-            Deviation(float(m), float(s))
-            for m, s in zip(missed.sum(axis=0) / light, sums.max(axis=0), strict=True)
+            Deviation(
+                misplaced(np.concatenate(values), truth, coloured),
+                max(abs(float(v.sum() - r.truth.sum())) for v, r in zip(values, rows, strict=True)),
+            )
+            for values in ([row.model for row in rows], [row.table for row in rows])
         ]
 
-    def side_by_side(self, theta: float, phi: float) -> list[Efficiencies]:
-        """Return the efficiencies of order 0 and of the strongest other one, at `SHOWN`."""
+    def side_by_side(self, theta: float, phi: float) -> Row:
+        """Return order 0 and the strongest other one, at `SHOWN`."""
         row = self._efficiencies(theta, phi, SHOWN)
         strongest = int(np.argmax(np.where(row.coloured, row.truth, -1.0)))
-        shown = [int(np.flatnonzero(row.order == 0)[0])]
-        if row.coloured[strongest]:
-            shown.append(strongest)
-        return [
-            Efficiencies(
-                int(row.order[n]), float(row.model[n]), float(row.table[n]), float(row.truth[n])
-            )
-            for n in shown
-        ]
+        shown = [int(np.flatnonzero(row.order == 0)[0]), strongest]
+        return Row(*(column[shown[: 1 + row.coloured[strongest]]] for column in row))
 
     def diffuse(self, samples: int = SAMPLES) -> list[Diffuse]:
         """Return the deviations from the table's own solver, of each kind of light."""
@@ -184,7 +174,7 @@ class Case:
             float(size.max()),
         )
 
-    def _efficiencies(self, theta: float, phi: float, wavelength: float) -> _Row:
+    def _efficiencies(self, theta: float, phi: float, wavelength: float) -> Row:
         recipe, table = self.recipe, self.table
         sine, turn = np.sin(np.radians(theta)) / recipe.superstrate, np.radians(phi)
         wi = np.array([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - sine**2)])
@@ -196,16 +186,14 @@ class Case:
         index = self._index(wavelength)
         model = efficiencies(self.field, index, wi, wo, inside, "small_slope", sigma=LOBE_SIGMA)
         solved = table.efficiency(-wi[0], wi[1], wavelength, order)
-        return _Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
+        return Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
 
     def _by_solver(self, solver: Solver, x: float, y: float, lam: float) -> dict[int, float]:
-        """Return the efficiencies of all orders at the station of the table for this light."""
+        """Return the efficiencies of all orders by the table's solver."""
         recipe, alone = self.recipe, (lam, lam)
         material = material_of(recipe.material, alone)
         grating = Grating(recipe.profile, material, recipe.superstrate, alone)
-        cell = cells.to_cell(x, y, lam, grating.optical_period)
-        place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho)
-        return _orders(solver, grating.station(*place, [0.0]), int(cell.channel))
+        return _unpolarised(solver, light_on(grating, x, y, lam))
 
     def _index(self, wavelength: float) -> complex:
         """Return the index over that of the superstrate."""
@@ -225,31 +213,9 @@ class Case:
         """Return the efficiencies of all orders by the solver beside, for unpolarised light."""
         inside = 1e-3 * wavelength / self.recipe.superstrate
         light = light_of(self.table.period, inside, self._index(wavelength), -wi[0], wi[1])
-        return _orders(self.solver, light.station, light.channel)
+        return _unpolarised(self.solver, light)
 
 
-def _orders(solver: Solver, station: Station, channel: int) -> dict[int, float]:
-    """Return the efficiencies of all orders, for light through a channel."""
-    power = (np.abs(solver.amplitudes(station)[0, channel]) ** 2).mean(axis=0).sum(axis=-1)
-    return {channel - q: float(value) for q, value in enumerate(power)}
-
-
-class _Row(NamedTuple):
-    """Efficiencies at one wavelength, (n,) each: orders, cosines, truth, model and table."""
-
-    order: NDArray[np.int64]
-    cosine: Real
-    truth: Real
-    model: Real
-    table: Real
-
-    @property
-    def coloured(self) -> NDArray[np.bool_]:
-        return (self.order != 0) & (self.cosine > _HORIZON)
-
-    @property
-    def light(self) -> float:
-        return float(self.truth[self.coloured].sum())
-
-    def missed(self, values: Real) -> float:
-        return float(np.abs(values - self.truth)[self.coloured].sum())
+def _unpolarised(solver: Solver, light: Light) -> dict[int, float]:
+    """Return the efficiencies of all orders."""
+    return {m: float(power.mean()) for m, power in powers_of(solver, light).items()}

@@ -7,11 +7,9 @@ they are gentle, which coupled waves do not. Coupled waves, which know no steepe
 
 from __future__ import annotations
 
-import datetime
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from importlib import resources
-from pathlib import Path
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -19,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.progress import Progress, silent
 from mitsuba_diffraction.reference import boundary
 
 from . import crossed, rayleigh
-from .patches import SURFACES, PatchCase, cell, patch_cases, patch_index
-from .solutions import load_rows, save_rows
+from .cases import index_of
+from .light import direction
+from .patches import SURFACES, PatchCase, cell, patch_cases
+from .solutions import DATA, Work, load_rows
 
 #: A row is one order (mx, my) of one case: wavelength in nm, angles in degrees, `surface` the place
 #: in `SURFACES`; `jones` as `crossed.Orders` has it; `change` is by how much the efficiency for
@@ -64,9 +63,7 @@ class Solved:
     @property
     def wi(self) -> NDArray[np.float64]:
         """Unit vector to the light, (3,)."""
-        theta, phi = np.radians([self.case.theta, self.case.phi])
-        sine = np.sin(theta)
-        return np.array([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)])
+        return direction(self.case.theta, self.case.phi)
 
     def wo(self, field: HeightField) -> NDArray[np.float64]:
         """Directions of the orders, (n, 3)."""
@@ -81,45 +78,31 @@ class Solved:
         return power * self.wo(field)[:, 2] / self.wi[2]
 
 
-def solve_patches(
-    material: str, solver: str, path: Path, progress: Progress | None = None
-) -> NDArray[np.void]:
-    """Rows of all cases of a material, written to a file after each.
-
-    Some minutes by Rayleigh's expansion; half an hour by coupled waves.
-
-    Raises
-    ------
-    DiffractionError
-        If the solver is not here, or the file cannot be written.
-    """
-    tell = progress or silent
-    cases, description = patch_cases(material), about(material, solver)
-    rows = np.empty(0, PATCH_ROW)
-    for n, case in enumerate(cases):
-        tell(n, len(cases), f"solving {case.surface.name}")
-        rows = np.concatenate([rows, solve_case(case, solver)])
-        save_rows(rows, description, path)
-    tell(len(cases), len(cases), "done")
-    return rows
+def file_of(material: str, solver: str) -> str:
+    """Name of the file of a material's solutions by a solver, without its suffix."""
+    return f"{material}_patches_{solver}"
 
 
-def about(material: str, solver: str) -> dict[str, Any]:
-    """Solver, settings and command of the solutions."""
-    return {
-        "command": f"python -m docs.make.validation patches {material} --solver {solver}",
-        "date": datetime.date.today().isoformat(),
+def work(material: str, solver: str) -> Work:
+    """Return all cases of a material, by Rayleigh's expansion or coupled waves."""
+    about = {
         "solver": SOLVERS[solver].name(),
         "material": material,
         "surfaces": _NAMES,
         "resolutions of gratings and of cells": RESOLUTIONS[solver],
     }
+    file = file_of(material, solver)
+    return Work(list(patch_cases(material)), partial(_by_file, file, solver), {file: about})
+
+
+def _by_file(file: str, solver: str, case: PatchCase) -> dict[str, NDArray[np.void]]:
+    return {file: solve_case(case, solver)}
 
 
 def solve_case(case: PatchCase, solver: str) -> NDArray[np.void]:
     """Rows of one case, by one of `SOLVERS` at two resolutions."""
     field = cell(case.surface)
-    index = patch_index(case.material, case.wavelength)
+    index = index_of(case.material, case.wavelength)
     solved = Solved(case, np.empty(0, PATCH_ROW))
     coarse, fine = (
         SOLVERS[solver].solve(field, index, case.wavelength, solved.wi, *resolution)
@@ -140,15 +123,8 @@ def solve_case(case: PatchCase, solver: str) -> NDArray[np.void]:
 
 def solved(material: str, solver: str = "rayleigh") -> tuple[list[Solved], Mapping[str, Any]]:
     """Stored solutions, case by case, and the description of their solver."""
-    data = resources.files(__package__) / "data"
-    with resources.as_file(data / patch_file(material, solver)) as path:
-        rows, description = load_rows(path, PATCH_ROW)
+    rows, description = load_rows(DATA / f"{file_of(material, solver)}.npz", PATCH_ROW)
     return list(_cases_of(rows, material)), description
-
-
-def patch_file(material: str, solver: str) -> str:
-    """Name of the file of a material's solutions by a solver."""
-    return f"{material}_patches_{solver}.npz"
 
 
 def _cases_of(rows: NDArray[np.void], material: str) -> Iterator[Solved]:

@@ -1,5 +1,7 @@
 """Surfaces in two dimensions, for comparisons with rigorous solutions.
 
+    python -m docs.make.validation.patches FILE    # cut the measured scale, see data/
+
 Small periodic cells: conical mounts of a sinusoid, a crossed grating, and cuts
 of scales and of a CD. A cut is made periodic, smoothed and scaled to a given slope, so that it can
 be solved with a few hundred harmonics.
@@ -7,19 +9,21 @@ be solved with a few hundred harmonics.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.figures.pages import option, program
 from mitsuba_diffraction import HeightField, gratings
 from mitsuba_diffraction.atomic import atomic_path
 
-from .cases import ALUMINIUM, KERATIN
+from .solutions import DATA
 
 KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
 #: Cuts of the measured patch; the project does not ship this patch.
@@ -63,8 +67,7 @@ class PatchCase:
     phi: float
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """Heights of a cut and its side, both in µm."""
 
     heights: NDArray[np.float64]
@@ -95,18 +98,17 @@ _MANY = ("Elaphe, cut 1", "Elaphe, cut 3")  # the others are for comparison
 _FEW = ((0.0, 0.0), (60.0, 0.0), (60.0, 45.0))
 
 
-def patch_cases(material: str) -> list[PatchCase]:
+def patch_cases(material: str) -> Iterator[PatchCase]:
     """All cases of a material, in a fixed order."""
-    return list(_cases(material))
-
-
-def patch_index(material: str, wavelength: float) -> complex:
-    """Index n + ik at a wavelength (nm) of the cases."""
-    if material == "keratin":
-        return complex(KERATIN)
-    # Mitsuba's table is smooth there
-    nodes = sorted(ALUMINIUM)
-    return complex(np.interp(wavelength, nodes, [ALUMINIUM[node] for node in nodes]))
+    for surface in SURFACES.values():
+        grating = surface.kind == "sinusoid"
+        if material != "keratin" and not grating and surface.slope > 0.1:
+            continue  # neither solver converges on a metal that is this steep
+        wavelengths = (460.0, 610.0) if surface.name == "Elaphe, cut 1" else (surface.wavelength,)
+        for wavelength in wavelengths:
+            many = grating or (material == "keratin" and surface.name in _MANY)
+            for theta, phi in _OBLIQUE if many else _FEW:
+                yield PatchCase(surface, material, wavelength, theta, phi)
 
 
 @cache
@@ -122,7 +124,7 @@ def cell(surface: Surface) -> HeightField:
         heights = line[None, :] + line[:, None]
         side = surface.size
     elif surface.kind == "elaphe":
-        heights, side = _measured()[surface.name].heights, _measured()[surface.name].side
+        heights, side = _measured()[surface.name]
     else:
         heights, side = _cut(surface, _source(surface))
     heights = heights - heights.mean()
@@ -133,7 +135,7 @@ def cell(surface: Surface) -> HeightField:
 def measured_cuts(patch: HeightField) -> dict[str, Cut]:
     """Cuts of the measured scale, by the names of their surfaces."""
     return {
-        surface.name: Cut(*_cut(surface, patch))
+        surface.name: _cut(surface, patch)
         for surface in SURFACES.values()
         if surface.kind == "elaphe"
     }
@@ -141,47 +143,31 @@ def measured_cuts(patch: HeightField) -> dict[str, Cut]:
 
 def save_measured(cuts: dict[str, Cut], folder: Path) -> Path:
     """Write the cuts of the measured scale, and return the file."""
-    parts: dict[str, NDArray[Any]] = {}
-    for n, cut in enumerate(cuts.values()):
-        parts[f"heights_{n}"] = cut.heights.astype(np.float32)
-        parts[f"side_{n}"] = np.array(cut.side)
     path = folder / _MEASURED
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        np.savez_compressed(file, names=np.array(list(cuts)), **parts)
+    with atomic_path(path) as temporary:
+        heights = np.array([cut.heights for cut in cuts.values()], np.float32)
+        sides = [cut.side for cut in cuts.values()]
+        np.savez_compressed(temporary, names=list(cuts), heights=heights, sides=sides)
     return path
 
 
 @cache
 def _measured() -> dict[str, Cut]:
     """Cuts of the measured scale, from the file that is kept."""
-    with np.load(Path(__file__).parent / "data" / _MEASURED) as parts:
-        return {
-            str(name): Cut(parts[f"heights_{n}"].astype(float), float(parts[f"side_{n}"]))
-            for n, name in enumerate(parts["names"])
-        }
+    with np.load(DATA / _MEASURED) as parts:
+        columns = parts["names"].tolist(), parts["heights"].astype(float), parts["sides"].tolist()
+        return {name: Cut(*cut) for name, *cut in zip(*columns, strict=True)}
 
 
-def _cases(material: str) -> Iterator[PatchCase]:
-    for surface in SURFACES.values():
-        grating = surface.kind == "sinusoid"
-        if material != "keratin" and not grating and surface.slope > 0.1:
-            continue  # neither solver converges on a metal that is this steep
-        wavelengths = (460.0, 610.0) if surface.name == "Elaphe, cut 1" else (surface.wavelength,)
-        for wavelength in wavelengths:
-            many = grating or (material == "keratin" and surface.name in _MANY)
-            for theta, phi in _OBLIQUE if many else _FEW:
-                yield PatchCase(surface, material, wavelength, theta, phi)
-
-
-def _cut(surface: Surface, patch: HeightField) -> tuple[NDArray[np.float64], float]:
-    """Heights (`PIXELS`, `PIXELS`) of a cut, periodic and smooth, and its side in µm."""
+def _cut(surface: Surface, patch: HeightField) -> Cut:
+    """Heights (`PIXELS`, `PIXELS`) of a cut, periodic and smooth, and its side."""
     pixel = patch.pixel_size[0]
     count = 2 * round(surface.size / pixel / 2)
     row, column = surface.place
     piece = patch.heights[row : row + count, column : column + count]
     periodic = _periodic(HeightField(piece, patch.pixel_size))
     side = count * pixel
-    return _smoothed(periodic.heights, side), side
+    return Cut(_smoothed(periodic.heights, side), side)
 
 
 def _source(surface: Surface) -> HeightField:
@@ -228,3 +214,15 @@ def _slope(heights: NDArray[np.float64], side: float) -> float:
     q = 2 * np.pi * np.fft.fftfreq(count, side / count)
     power = np.abs(np.fft.fft2(heights) / heights.size) ** 2
     return float(np.sqrt(np.sum(power * (q[None, :] ** 2 + q[:, None] ** 2))))
+
+
+@program(
+    option("patch", type=Path, help="the measured scale, in an image"),
+    option("--pixel-size", type=float, default=65 / 1332, metavar="MICROMETRES"),
+    option("--max-height", type=float, default=0.375, metavar="MICROMETRES"),
+    option("-o", "--output", metavar="FOLDER", type=Path, default=DATA),
+)
+def main(args: argparse.Namespace) -> None:
+    """Cut the measured scale."""
+    patch = HeightField.load(args.patch, pixel_size=args.pixel_size, max_height=args.max_height)
+    print(f"wrote {save_measured(measured_cuts(patch), args.output)}")

@@ -11,7 +11,9 @@ from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile, lamellar, sinusoidal
-from mitsuba_diffraction.orders.solve.stations import Solver, Station
+from mitsuba_diffraction.orders.solve.stations import Solver
+
+from .light import Light, light_of, powers_of
 
 #: Metal of the lamellar gratings.
 _METAL = 0.22 + 6.71j
@@ -22,7 +24,7 @@ class Published(NamedTuple):
 
     source : where they are printed.
     grating : in words.
-    station : of the light, which comes in through channel 0; order −q leaves through channel q.
+    light : as the solvers have it.
     printed : efficiencies by order and polarisation, s or p in the plane across the grooves, or "u"
         for unpolarised light.
     tolerance : error of the printed numbers: their digits, or of the method that made them.
@@ -32,7 +34,7 @@ class Published(NamedTuple):
     source: str
     grating: str
     profile: Profile
-    station: Station
+    light: Light
     printed: dict[tuple[int, str], float]
     tolerance: float
     points: int
@@ -47,27 +49,9 @@ class Published(NamedTuple):
 
     def solved(self, solver: Solver) -> dict[tuple[int, str], float]:
         """Return the efficiencies that are printed, by a solver."""
-        powers = (np.abs(solver.amplitudes(self.station)[0, 0]) ** 2).sum(axis=-1)
-        of_light = {"s": powers[0], "p": powers[1], "u": powers.mean(axis=0)}
-        return {(m, name): float(of_light[name][-m]) for m, name in self.printed}
-
-
-class Light(NamedTuple):
-    """Station of some light, and the channel of its mirror direction."""
-
-    station: Station
-    channel: int
-
-
-def light_of(period: float, wavelength: float, index: complex, x: float, y: float) -> Light:
-    """Return light of one wavelength (µm) whose mirror direction has the cosines x and y."""
-    c = np.sqrt(1.0 - y * y)
-    extent = 2.0 * c * period / wavelength
-    place = 0.5 * extent * (1.0 - x / c)
-    fraction = place % 1.0
-    channels = int(np.floor(extent - fraction)) + 1
-    arrays = np.array([wavelength]), np.array([index]), np.array([abs(y)])
-    return Light(Station(extent, fraction, channels, *arrays), int(place))
+        powers = powers_of(solver, self.light)
+        of_light = {"s": 0, "p": 1, "u": slice(None)}
+        return {(m, name): float(powers[m][of_light[name]].mean()) for m, name in self.printed}
 
 
 def _lamellar(
@@ -81,9 +65,9 @@ def _lamellar(
     """Return a case of grooves of metal, one wavelength wide, in light at 30°."""
     grating = f"lamellar 1/{depth:g} µm, duty 0.5, n = 0.22 + 6.71i, 1 µm at 30°, φ = {phi:g}°"
     turn = np.radians(phi)
-    station = light_of(1.0, 1.0, _METAL, 0.5 * np.cos(turn), 0.5 * np.sin(turn)).station
+    light = light_of(1.0, 1.0, _METAL, 0.5 * np.cos(turn), 0.5 * np.sin(turn))
     profile = lamellar(1.0, depth)
-    return Published(source, grating, profile, station, printed, tolerance, *resolutions)
+    return Published(source, grating, profile, light, printed, tolerance, *resolutions)
 
 
 _RETICOLO = (
@@ -98,7 +82,7 @@ PUBLISHED = (
         "Johnson 2005, GD-Calc, gdc_demo1a, for table 2 of Li 1993 (J. Opt. Soc. Am. A 10, 2581)",
         "sinusoidal 1/0.3 µm, n = 2, 0.5 µm, 75° to the grooves and 60° across them: conical",
         sinusoidal(1.0, 0.3),
-        light_of(1.0, 0.5, 2.0, np.sin(_ANGLE) * np.sin(np.radians(60.0)), np.cos(_ANGLE)).station,
+        light_of(1.0, 0.5, 2.0, np.sin(_ANGLE) * np.sin(np.radians(60.0)), np.cos(_ANGLE)),
         {
             (0, "s"): 0.10292, (-1, "s"): 0.038523, (-2, "s"): 0.037459, (-3, "s"): 0.011242,
             (0, "p"): 0.010815, (-1, "p"): 0.0069991, (-2, "p"): 0.03552, (-3, "p"): 0.020764,

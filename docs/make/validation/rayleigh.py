@@ -100,19 +100,6 @@ def through(
     return _orders(waves, wi, amplitudes, mean, down / index, waves.below[:, 2].real)
 
 
-def transmitted(
-    field: HeightField,
-    index: complex,
-    wavelength: float,
-    wi: NDArray[np.float64],
-    harmonics: int,
-) -> float:
-    """Share of unpolarised light that a dielectric lets through, all orders; as `solve`."""
-    orders = through(field, index, wavelength, wi, harmonics)
-    cosines = -complex(index).real * orders.wo[:, 2]
-    return float(np.sum(boundary.unpolarised(orders.jones) * cosines) / wi[2])
-
-
 def axes(vector: Complex, index: complex) -> Complex:
     """Electric fields s and p of plane waves κ (..., 3) in a medium, (2, ..., 3).
 

@@ -13,7 +13,9 @@ closed. The coherent part is the mirror's lobe of docs/theory.md, eq. 10.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -123,53 +125,21 @@ class Estimate:
         return np.asarray((self.mean - np.asarray(exact)) / self.error)
 
 
-def measured_brdf(
-    roughness: Roughness,
+def estimate(
+    fields: Iterable[HeightField],
     wi: ArrayLike,
     wo: ArrayLike,
     wavelength: ArrayLike,
-    *,
-    coherence_width: float,
-    surfaces: int,
-    extent: float = 20.0,
-    pixels: int = 96,
-    seed: int = 0,
+    **settings: Any,
 ) -> Estimate:
-    """`reference.brdf` of `surfaces` seeded patches, averaged: what `mean_brdf` predicts."""
-    samples = np.array(
-        [
-            reference.brdf(
-                roughness.patch(extent, pixels, seed + n), wi, wo, wavelength,
-                coherence_width=coherence_width,
-            )
-            for n in range(surfaces)
-        ]
-    )  # fmt: skip
-    return Estimate.of(samples)
-
-
-def offset_brdf(
-    field: HeightField,
-    wi: ArrayLike,
-    wo: ArrayLike,
-    wavelength: ArrayLike,
-    *,
-    coherence_width: float,
-    offsets: int,
-    seed: int = 0,
-) -> Estimate:
-    """`patch` BRDFs of a field under windows at random places, averaged: what `ensemble` means.
-
-    The patch is cut anew for every place (it tiles), which puts its centre, and the window, there.
-    """
-    rng = np.random.default_rng(seed)
-    samples = []
-    for _ in range(offsets):
-        shift = tuple(int(rng.integers(0, n)) for n in field.shape)
-        moved = HeightField(np.roll(field.heights, shift, (0, 1)), field.pixel_size)
-        samples.append(
-            reference.brdf(
-                moved, wi, wo, wavelength, coherence_width=coherence_width, coherence="patch"
-            )
-        )
+    """`reference.brdf` of some fields, averaged; `settings` are arguments of it."""
+    samples = [reference.brdf(field, wi, wo, wavelength, **settings) for field in fields]
     return Estimate.of(np.array(samples))
+
+
+def shifted(field: HeightField, count: int, seed: int = 0) -> Iterator[HeightField]:
+    """Yield a field that is cut anew at random places (it tiles), where its window is then."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        shift = tuple(int(rng.integers(0, n)) for n in field.shape)
+        yield HeightField(np.roll(field.heights, shift, (0, 1)), field.pixel_size)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,25 +33,19 @@ _CROP, _WHOLE, _PIXEL = 77, 1024, 0.13
 WIDTH, WAVELENGTHS = _CROP * _PIXEL, np.arange(430.0, 801.0, 20.0)
 
 
-@dataclass(frozen=True)
-class Hue:
+class Hue(NamedTuple):
     """A peak of a scan against that of the closed form.
 
     Attributes
     ----------
-    side, period, turn : of scan and grating, µm, µm and degrees.
-    wavelength : mean above half the height in closed form, nm.
-    hue, width, peak : relative deviation of this mean, width at half height over the ideal one, and
-        relative deviation of the highest point.
+    hue, peak : relative deviation of the mean wavelength above half the height, and of the highest
+        point.
+    width : at half height over the ideal one.
     """
 
-    side: float
-    period: float
-    turn: float
-    wavelength: float
     hue: float
-    width: float
     peak: float
+    width: float
 
 
 @dataclass(frozen=True)
@@ -108,9 +103,7 @@ def hue(side: float, period: float, turn: float, order: int, phase: float) -> Hu
     # 4 cosθi cosθo N/(λ² w²) of a perfect reflector is as smooth as 1/λ²
     ideal = np.sum(lobes[orders[:, 0] != 0], axis=0) / lam**2
     (mean, wide, top), (expected, width, highest) = (_peak(lam, v) for v in (seen, ideal))
-    return Hue(
-        side, period, turn, expected, mean / expected - 1.0, wide / width, top / highest - 1.0
-    )
+    return Hue(mean / expected - 1.0, top / highest - 1.0, wide / width)
 
 
 def _peak(lam: Real, value: Real) -> tuple[float, float, float]:

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
-from .cases import MATERIALS, PROFILES
+from .cases import MATERIALS, PROFILES, Grating, order_sines
+
+#: Folder of the stored solutions.
+DATA = Path(__file__).parent / "data"
+#: Polarisations: electric and magnetic field along the grooves.
+LIGHTS = ("te", "tm")
 
 #: A row is one order of one grating at one wavelength and angle. Lengths in µm, wavelength in nm,
 #: theta in degrees; `te` and `tm` are the efficiencies (reflected power in this order, of the
@@ -95,12 +101,14 @@ class Solutions:
         return np.asarray(worst[solution.ravel()] <= CONVERGED)
 
     def where(self, **values: Any) -> Solutions:
-        """The rows with these values, such as profile="lamellar" or theta=30.0."""
+        """The rows with these values: a grating, or such as profile="lamellar" or theta=30.0."""
         return Solutions(self.rows[self.having(**values)], self.about)
 
-    def having(self, **values: Any) -> NDArray[np.bool_]:
+    def having(self, grating: Grating | None = None, **values: Any) -> NDArray[np.bool_]:
         """Which rows have these values, (n,); as in `where`."""
         keep = np.ones(len(self.rows), bool)
+        if grating is not None:
+            values |= vars(grating)
         for name, value in values.items():
             wanted: Any = PROFILES.index(value) if name == "profile" else np.float32(value)
             keep &= self.rows[name] == wanted
@@ -111,19 +119,8 @@ class Solutions:
         return Solutions(self.rows[self.converged], self.about)
 
 
-def save(solutions: Solutions, path: str | os.PathLike[str]) -> None:
-    """Write an .npz file, atomically.
-
-    Raises
-    ------
-    DiffractionError
-        If it cannot be written.
-    """
-    save_rows(solutions.rows, solutions.about, path)
-
-
 def load(path: str | os.PathLike[str]) -> Solutions:
-    """Read what `save` wrote.
+    """Read what `save_rows` wrote.
 
     Raises
     ------
@@ -136,7 +133,13 @@ def load(path: str | os.PathLike[str]) -> Solutions:
 def save_rows(
     rows: NDArray[np.void], about: Mapping[str, Any], path: str | os.PathLike[str]
 ) -> None:
-    """Write rows of any type as columns, and what made them, as `save`."""
+    """Write rows of any type as columns of an .npz file, and what made them.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be written.
+    """
     text = json.dumps(dict(about), indent=1, ensure_ascii=False)
     columns = {name: rows[name] for name in rows.dtype.names or ()}
     with atomic_path(path) as temporary:
@@ -155,7 +158,7 @@ def load_rows(
         reason = " ".join(str(error).split())
         raise DiffractionError(
             f"cannot read solutions from '{os.fspath(path)}': {reason}; "
-            "make them with `python -m docs.make.validation solve`"
+            "make them with `python -m docs.make.validation.solve`"
         ) from error
     rows = np.empty(len(next(iter(columns.values()))), dtype)
     for name, column in columns.items():
@@ -175,11 +178,69 @@ def shipped(material: str, solver: str = "integral") -> Solutions:
         raise DiffractionError(
             f"material '{material}' is unknown; choose one of {', '.join(MATERIALS)}"
         )
-    data = resources.files(__package__) / "data"
-    with resources.as_file(data / file_name(material, solver)) as path:
-        return load(path)
+    return stored(f"{material}_{solver}")
 
 
-def file_name(material: str, solver: str) -> str:
-    """Name of the file of a material's solutions."""
-    return f"{material}_{solver}.npz"
+def stored(file: str) -> Solutions:
+    """The solutions of a file of `DATA`, named without its suffix."""
+    return load(DATA / f"{file}.npz")
+
+
+class Work(NamedTuple):
+    """Cases that are solved together.
+
+    Attributes
+    ----------
+    cases : arguments of `solve`.
+    solve : returns rows by file of `DATA`, named without its suffix; runs in other processes.
+    about : solver, material and more of each file.
+    """
+
+    cases: Sequence[Any]
+    solve: Callable[[Any], dict[str, NDArray[np.void]]]
+    about: dict[str, dict[str, Any]]
+
+
+def order_rows(
+    grating: Grating, theta: float, wavelength: float,
+    coarse: Sequence[ArrayLike], fine: Sequence[ArrayLike],
+    balance: Sequence[float] = (np.nan, np.nan),
+) -> NDArray[np.void]:  # fmt: skip
+    """Return rows of `ROW` of a grating in light of one direction and wavelength.
+
+    coarse, fine : efficiencies of the orders of `cases.order_sines` for each of `LIGHTS`, of the
+        last two resolutions.
+    """
+    orders, _ = order_sines(grating.period, wavelength, theta)
+    rows = np.empty(len(orders), ROW)
+    rows["profile"] = PROFILES.index(grating.profile)
+    rows["period"], rows["depth"] = grating.period, grating.depth
+    rows["theta"], rows["wavelength"], rows["order"] = theta, wavelength, orders
+    for n, light in enumerate(LIGHTS):
+        rows[light] = fine[n]
+        rows[f"{light}_change"] = np.abs(np.subtract(fine[n], coarse[n]))
+        rows[f"{light}_balance"] = balance[n]
+    return rows
+
+
+def imported(module: str) -> Any:
+    """Import a module of a package that the extra `validation` has.
+
+    Raises
+    ------
+    DiffractionError
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise DiffractionError(
+            f"{module.partition('.')[0]} is not installed; install the extra: "
+            "pip install '.[validation]'"
+        ) from error
+
+
+def version(package: str) -> str:
+    """Return the version of a package of the extra; errors as `imported`."""
+    imported(package)
+    return importlib.metadata.version(package)

@@ -1,86 +1,70 @@
-"""Rigorous solutions of all scans, each at two resolutions or more, on all processors."""
+"""Solve cases rigorously, and write the files of data/.
+
+python -m docs.make.validation.solve perfect_integral     # minutes to an hour; extra `validation`
+python -m docs.make.validation.solve keratin_patches_rayleigh     # in two dimensions; a minute
+python -m docs.make.validation.solve coated               # under a coat; half an hour
+python -m docs.make.validation.solve films                # under a film; seconds
+"""
 
 from __future__ import annotations
 
-import contextlib
+import argparse
 import datetime
-import functools
 import itertools
 import multiprocessing
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from types import ModuleType
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.progress import Progress
+from docs.make.figures.pages import option, program, progress_option
+from mitsuba_diffraction.cli import Bar, check_outputs
 
-from . import coupled_wave, integral
-from .cases import ALUMINIUM, KERATIN, PROFILES, Scan, order_sines, scans
-from .solutions import ROW, Solutions
+from . import coated, coupled_wave, filmed, integral, patch_solutions
+from .cases import MATERIALS, Scan, index_text, scans
+from .solutions import DATA, LIGHTS, Solutions, Work, order_rows, save_rows
 
 #: Each solves a `Scan` at one of its `resolutions`.
 SOLVERS: dict[str, ModuleType] = {"integral": integral, "coupled_wave": coupled_wave}
 
-_INDEX = {
-    "perfect": "perfect conductor",
-    "aluminium": ", ".join(f"{n:g} at {w:g} nm" for w, n in ALUMINIUM.items()),
-    "keratin": f"{KERATIN:g}",
+
+def of_gratings(material: str, solver: str) -> Work:
+    """Return all scans of a material, or those that both solvers are compared on."""
+    method, wanted = SOLVERS[solver], scans(material)
+    if method is coupled_wave:
+        wanted = coupled_wave.part_of(wanted)
+    file = f"{material}_{solver}"
+    about = {"solver": method.name(), "material": material, "index": index_text(material)}
+    return Work(wanted, partial(_by_file, file, solver), {file: about})
+
+
+#: Cases by the names of the command.
+WORKS: dict[str, Callable[[], Work]] = {
+    **{
+        f"{material}_{solver}": partial(of_gratings, material, solver)
+        for material in MATERIALS
+        for solver in SOLVERS
+        if material != "perfect" or solver == "integral"  # coupled waves need an index
+    },
+    **{
+        patch_solutions.file_of(material, solver): partial(patch_solutions.work, material, solver)
+        for material in ("aluminium", "keratin")
+        for solver in patch_solutions.SOLVERS
+    },
+    "coated": coated.work,
+    "films": filmed.work,
 }
 
 
-def solve_material(
-    material: str,
-    solver: str = "integral",
-    *,
-    processes: int | None = None,
-    progress: Progress | None = None,
-) -> Solutions:
-    """Solve all scans of a material, which takes from minutes to an hour.
-
-    Parameters
-    ----------
-    material : one of `cases.MATERIALS`.
-    solver : of `SOLVERS`; coupled waves solve a part of the scans, for comparison.
-    processes : how many at a time; by default one per processor.
-    progress : called as progress(done, total, text).
-
-    Raises
-    ------
-    DiffractionError
-        If the material or solver is unknown, the solver cannot do this material or is not
-        installed.
-    """
-    wanted = scans(material)
-    if solver not in SOLVERS:
-        raise DiffractionError(f"solver '{solver}' is unknown; choose one of {', '.join(SOLVERS)}")
-    method = SOLVERS[solver]
-    if not method.available():
-        raise DiffractionError(
-            f"the solver '{solver}' is not installed; pip install '.[validation]'"
-        )
-    if method is coupled_wave:
-        wanted = coupled_wave.part_of(wanted)
-    rows: list[NDArray[np.void]] = []
-    # Children start anew: what they inherit of BLAS's threads could not be changed
-    with _one_thread_each(), multiprocessing.get_context("spawn").Pool(processes) as pool:
-        results = pool.imap(functools.partial(solve_scan, solver=solver), wanted)
-        for n, result in enumerate(results):
-            rows.append(result)
-            if progress:
-                progress(n + 1, len(wanted), f"solving {material}")
-    about = {
-        "command": f"python -m docs.make.validation solve {material} --solver {solver}",
-        "date": datetime.date.today().isoformat(),
-        "solver": method.name(),
-        "material": material,
-        "index": _INDEX[material],
-    }
-    return Solutions(np.concatenate(rows), about)
+def _by_file(file: str, solver: str, scan: Scan) -> dict[str, NDArray[np.void]]:
+    return {file: solve_scan(scan, solver=solver)}
 
 
 def solve_scan(
@@ -109,33 +93,62 @@ def solve_scan(
 def _solve_twice(scan: Scan, method: ModuleType, first: Any, final: Any) -> Solutions:
     """A scan at the `final` resolution, with the change from the `first` one."""
     coarse, fine = method.solve(scan, first), method.solve(scan, final)
-    rows = []
-    for n, wavelength in enumerate(scan.wavelengths):
-        orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
-        part = np.empty(len(orders), ROW)
-        part["profile"] = PROFILES.index(scan.grating.profile)
-        part["period"], part["depth"] = scan.grating.period, scan.grating.depth
-        part["theta"], part["wavelength"], part["order"] = scan.theta, wavelength, orders
-        for polarisation in ("te", "tm"):
-            final_values = fine.orders[polarisation][n]
-            part[polarisation] = final_values
-            part[f"{polarisation}_change"] = np.abs(final_values - coarse.orders[polarisation][n])
-            part[f"{polarisation}_balance"] = fine.balance[polarisation][n]
-        rows.append(part)
+    rows = [
+        order_rows(
+            scan.grating, scan.theta, wavelength,
+            *([each.orders[light][n] for light in LIGHTS] for each in (coarse, fine)),
+            balance=[fine.balance[light][n] for light in LIGHTS],
+        )
+        for n, wavelength in enumerate(scan.wavelengths)
+    ]  # fmt: skip
     return Solutions(np.concatenate(rows), {})
 
 
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """BLAS in each process would fight the others for the processors."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
+#: Threads of one process: BLAS in each would fight the others for the processors.
+_ONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+
+def _jobs(text: str) -> int:
     try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        count = int(text)
+    except ValueError:
+        count = 0
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got '{text}'")
+    return count
+
+
+@program(
+    option("name", metavar="NAME", choices=tuple(WORKS), help=f"one of {', '.join(WORKS)}"),
+    option("-o", "--output", metavar="FOLDER", type=Path, default=DATA),
+    option("-j", "--jobs", metavar="N", type=_jobs, help="processes; all processors"),
+    progress_option(),
+)
+def main(args: argparse.Namespace) -> None:
+    """Solve the cases of a name and write their files."""
+    work = WORKS[args.name]()
+    paths = {file: args.output / f"{file}.npz" for file in work.about}
+    check_outputs(list(paths.values()))
+    rows: dict[str, list[NDArray[np.void]]] = {file: [] for file in paths}
+    # Children start anew: what they inherit of BLAS's threads could not be changed
+    with (
+        Bar(args, unit=" cases") as bar,
+        mock.patch.dict(os.environ, _ONE),
+        multiprocessing.get_context("spawn").Pool(args.jobs) as pool,
+    ):
+        for n, solved in enumerate(pool.imap(work.solve, work.cases)):
+            for file, part in solved.items():
+                rows[file].append(part)
+            bar(n + 1, len(work.cases), f"solving {args.name}")
+    made = {
+        "command": f"python -m docs.make.validation.solve {args.name}",
+        "date": datetime.date.today().isoformat(),
+    }
+    for file, path in paths.items():
+        every = np.concatenate(rows[file])
+        save_rows(every, made | work.about[file], path)
+        change = max(np.nanmax(every[c]) for c in every.dtype.names or () if c.endswith("change"))
+        print(
+            f"wrote {path}: {len(every)} orders; the last refinement changed them by "
+            f"{change:.1g} at most"
+        )

@@ -9,7 +9,6 @@ import numpy as np
 
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics.coat import face_transmittance
-from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve.crossed import CrossedWaves
 from mitsuba_diffraction.orders.solve.films import structure_of
 from mitsuba_diffraction.orders.solve.grating_index import material_of
@@ -21,6 +20,8 @@ from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import CrossedStation, Grating
 
 from . import crossed
+from .light import direction, light_on, powers_of
+from .solutions import imported
 
 # Wavelengths of the structures, nm
 _RANGE = (500.0, 600.0)
@@ -64,20 +65,13 @@ def efficiencies(
     harmonics : of the solver that the package chooses.
     theta, wavelength : of the light, degrees and nm.
     """
-    period = grating.optical_period
-    cell = cells.to_cell(-np.sin(np.radians(theta)), 0.0, wavelength, period)
-    w = float(cells.w_of(cell.k_continuous, wavelength, _RANGE, period))
     solver = solver_of(problem_of(grating, AUTO, harmonics))
-    place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), (w,)
-    j = int(cell.channel)
-    powers = (np.abs(solver.amplitudes(grating.station(*place))[0, j]) ** 2).sum(axis=-1)
-    return {j - q: powers[:, q] for q in range(powers.shape[1])}
+    return powers_of(solver, light_on(grating, -np.sin(np.radians(theta)), 0.0, wavelength))
 
 
 def by_ikarus(theta: float, wavelength: float) -> dict[int, np.ndarray]:
     """Return efficiencies (2,) of s and p light by order, of `RIDGES` by ikarus-rcwa."""
-    import ikarus
-
+    ikarus = imported("ikarus")
     (period, depth, duty), pixels = RIDGES, 40
     ridge = np.repeat((np.arange(pixels) < duty * pixels).astype(int)[:, None], 2, axis=1)
     solved = []
@@ -141,8 +135,7 @@ def _closed_forms() -> Iterator[Compared]:
 
 
 def _transfer_matrices() -> Iterator[Compared]:
-    import tmm
-
+    tmm = imported("tmm")
     lam, metal = 540.0, {"layers": [("1.38", 0.12)], "beneath": MIRROR, "substrate": "Al"}
     films: Sequence[tuple[str, float]] = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
     flat = {
@@ -213,8 +206,7 @@ def _crossed() -> Iterator[Compared]:
     lumps = 0.25 * (1.0 - np.cos(x)) * (1.0 - np.cos(y)) + 0.2 * np.sin(x)
     # without mirror planes, so that every sign shows
     field = HeightField(0.1 * (lumps + 0.1 * np.sin(x + 2.0 * y)), 0.5 / pixels)
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
-    wi = np.array([sine * np.cos(turn), sine * np.sin(turn), np.cos(np.radians(theta))])
+    wi = direction(theta, phi)
     station = CrossedStation(-wi[0], -wi[1], 1e-3 * lam, 1.5 + 0j, field.extent)
     solver = CrossedWaves(UnitCell(field.heights, field.extent), 5)
     orders = station.orders.tolist()

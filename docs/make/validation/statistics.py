@@ -13,7 +13,7 @@ from mitsuba_diffraction.heights.spectra import order_powers
 from mitsuba_diffraction.optics.geometry import wavenumber
 
 from .model import in_plane
-from .roughness import Estimate, Roughness, mean_brdf, mean_order_0, measured_brdf, offset_brdf
+from .roughness import Estimate, Roughness, estimate, mean_brdf, mean_order_0, shifted
 
 _CORRELATION = 1.0  # µm
 _WAVELENGTH = 550.0  # nm
@@ -104,10 +104,8 @@ def lobe(
     angles = np.array([-65, -55, -45, -35, -28, -24, -22, -20, -18, -16, -12, -5, 5, 15, 30.0])
     wi = in_plane(np.sin(np.radians(theta)))
     wo = in_plane(np.sin(np.radians(angles)))
-    measured = measured_brdf(
-        rough, wi, wo, _WAVELENGTH,
-        coherence_width=coherence_width, surfaces=surfaces, seed=seed,
-    )  # fmt: skip
+    fields = (rough.patch(20.0, 96, seed + n) for n in range(surfaces))
+    measured = estimate(fields, wi, wo, _WAVELENGTH, coherence_width=coherence_width)
     exact = _exact(rough, theta, angles, coherence_width)
     return Lobe(rough, theta, _WAVELENGTH, coherence_width, angles, measured, exact)
 
@@ -118,10 +116,9 @@ def random_windows(count: int, *, theta: float = 20.0, coherence_width: float = 
     angles = np.array([-60, -45, -35, -28, -20, -12, -5, 5, 15, 25.0])
     wi = in_plane(np.sin(np.radians(theta)))
     wo = in_plane(np.sin(np.radians(angles)))
-    patches = offset_brdf(
-        surface, wi, wo, _WAVELENGTH, coherence_width=coherence_width, offsets=count
-    )
-    ensemble = reference.brdf(surface, wi, wo, _WAVELENGTH, coherence_width=coherence_width)
+    lit, width = (wi, wo, _WAVELENGTH), coherence_width
+    patches = estimate(shifted(surface, count), *lit, coherence_width=width, coherence="patch")
+    ensemble = reference.brdf(surface, *lit, coherence_width=width)
     return Offsets(angles, patches, ensemble, count)
 
 

@@ -7,7 +7,7 @@ are computed with the page and not stored.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +21,8 @@ from mitsuba_diffraction.reference import boundary
 
 from . import rayleigh
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating
-from .compare import GRAZING
+from .compare import GRAZING, misplaced
+from .light import direction
 from .model import LOBE_SIGMA
 
 Real = NDArray[np.float64]
@@ -50,43 +51,32 @@ INDEX = 1.5
 _HARMONICS, _PIXELS = 31, 64
 
 
-class Orders(NamedTuple):
-    """Efficiencies of transmitted orders, (n,), and which are colours within `GRAZING`."""
-
-    model: Real
-    rigorous: Real
-    coloured: NDArray[np.bool_]
+@cache
+def _solved(grating: Grating, theta: float, azimuth: float, wavelength: float) -> rayleigh.Orders:
+    wi = direction(theta, azimuth)
+    return rayleigh.through(grating.heights(_PIXELS), KERATIN, wavelength, wi, _HARMONICS)
 
 
-def orders_of(
+def _efficiencies(
     grating: Grating, theta: float, azimuth: float, wavelength: float, model: str
-) -> Orders:
-    """Efficiencies by one of `MODELS` and by Rayleigh's expansion, for light from above."""
-    field = grating.heights(_PIXELS)
-    polar, turn = np.radians([theta, azimuth])
-    wi = np.array([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)])
-    exact = rayleigh.through(field, KERATIN, wavelength, wi, _HARMONICS)
+) -> tuple[Real, Real]:
+    """Efficiencies of colours by one of `MODELS` and by Rayleigh's expansion, light from above."""
+    exact, wi = _solved(grating, theta, azimuth, wavelength), direction(theta, azimuth)
     cosines = -KERATIN * exact.wo[:, 2]
     btdf = reference.btdf(
-        field, wi, exact.wo, wavelength,
+        grating.heights(_PIXELS), wi, exact.wo, wavelength,
         eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * LOBE_SIGMA, model=model,
     )  # fmt: skip
     per_btdf = np.pi / (LOBE_SIGMA * float(wavenumber(wavelength))) ** 2
-    return Orders(
-        per_btdf * btdf,
-        boundary.unpolarised(exact.jones) * cosines / wi[2],
-        (exact.order != 0).any(axis=1) & (-exact.wo[:, 2] > np.cos(np.radians(GRAZING))),
-    )
+    coloured = (exact.order != 0).any(axis=1) & (-exact.wo[:, 2] > np.cos(np.radians(GRAZING)))
+    rigorous = boundary.unpolarised(exact.jones) * cosines / wi[2]
+    return (per_btdf * btdf)[coloured], rigorous[coloured]
 
 
 def deviation(grating: Grating, theta: float, azimuth: float, model: str) -> float:
     """Deviation of transmitted colours, Σ|η − η_rigorous| / Σ η_rigorous at both wavelengths."""
-    off = total = 0.0
-    for wavelength in FEW_WAVELENGTHS:
-        orders = orders_of(grating, theta, azimuth, wavelength, model)
-        off += float(np.abs(orders.model - orders.rigorous)[orders.coloured].sum())
-        total += float(orders.rigorous[orders.coloured].sum())
-    return off / total
+    parts = (_efficiencies(grating, theta, azimuth, lam, model) for lam in FEW_WAVELENGTHS)
+    return misplaced(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 class Deviations(NamedTuple):

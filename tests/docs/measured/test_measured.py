@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from docs.make.measured import cases, predict
-from docs.make.measured.grooves import Groove, heights_of
+from docs.make.measured.grooves import Groove
+from docs.make.validation.light import heights_of
 
 pytest.importorskip("gratinglab")
 
@@ -43,10 +44,9 @@ def test_rounding_keeps_the_mean_height():
 def test_the_model_is_near_solved_orders_through_gentle_grooves():
     # 5° of glass: the model's slopes are within its range, 0.09 RMS
     profile, lam = Groove(5.0).profile(3.3), np.array([520.0])
-    solver = predict.through_solver(profile)
     for outwards in (True, False):
-        solved = predict.through_solved(solver, 3.3, 1.52, lam, outwards)
-        model = predict.through_modelled(profile, 1.52, lam, outwards)
+        solved = predict.through_solved(1.52, outwards, profile, lam)
+        model = predict.through_modelled(1.52, outwards, profile, lam)
         assert model == pytest.approx(solved, abs=0.02)
 
 

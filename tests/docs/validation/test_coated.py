@@ -7,6 +7,7 @@ import pytest
 
 from docs.make.validation import coated
 from docs.make.validation.cases import COAT, order_sines
+from docs.make.validation.solutions import stored
 from mitsuba_diffraction.reference.fresnel import amplitudes
 
 
@@ -48,9 +49,8 @@ def test_an_order_inside_is_solved_as_it_is_kept():
     grating = coated.GRATINGS[2]
     rows = coated.solve_one(grating, 30.0, 610.0)
     for series in coated.SERIES:
-        kept = coated.shipped_coated(series).where(
-            profile=grating.profile, period=grating.period, depth=grating.depth,
-            theta=30.0, wavelength=610.0,
-        )  # fmt: skip
+        kept = stored(coated.FILE.format(series)).where(
+            grating=grating, theta=30.0, wavelength=610.0
+        )
         assert rows[series]["te"] == pytest.approx(kept.rows["te"], abs=1e-6)
         assert rows[series]["tm"] == pytest.approx(kept.rows["tm"], abs=1e-6)

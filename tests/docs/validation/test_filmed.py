@@ -9,11 +9,12 @@ from docs.make.validation import filmed, rayleigh
 from docs.make.validation.cases import ALUMINIUM, order_sines
 from docs.make.validation.filmed import GRATINGS, STACKS, Stack
 from docs.make.validation.model import in_plane
+from docs.make.validation.solutions import stored
 
 
 def test_a_film_of_air_is_the_bare_grating_of_the_reduced_expansion():
     grating, wavelength = GRATINGS[2], 610.0
-    found = filmed.solve(grating, Stack("", ALUMINIUM, 1.0, 200.0), 30.0, wavelength, 16)
+    found = filmed.solve(grating, Stack("", "aluminium", 1.0, 200.0), 30.0, wavelength, 16)
     orders = rayleigh.solve(
         grating.heights(256), ALUMINIUM[wavelength], wavelength, in_plane(0.5), 31
     )
@@ -25,7 +26,7 @@ def test_a_film_of_air_is_the_bare_grating_of_the_reduced_expansion():
 
 def test_what_is_kept_is_what_is_solved_and_has_converged():
     stack, grating = STACKS[3], GRATINGS[3]
-    kept = filmed.shipped_film(stack)
+    kept = stored(stack.file)
     assert kept.change.max() < 1e-6
     part = kept.where(period=1.1, depth=grating.depth, theta=60.0, wavelength=460.0)
     solved = filmed.solve(grating, stack, 60.0, 460.0, 14)

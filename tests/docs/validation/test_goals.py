@@ -23,9 +23,7 @@ def sides() -> goals.Sides:
 
 @pytest.fixture(scope="module")
 def cases(sides) -> list[goals.Case]:
-    models = goals.models_of(sides, "aluminium")
-    half = compare("aluminium", models["kirchhoff"].solutions, "half_and_half")
-    return goals.singles({**models, "half_and_half": half})
+    return goals.singles(goals.with_half(sides, "aluminium"))
 
 
 def test_on_keratin_in_oblique_light_goals_are_met(sides):
@@ -75,10 +73,3 @@ def test_no_blend_does_better_than_the_bounds(cases):
         assert bound <= best <= min(map(case.deviation, ("kirchhoff", "small_slope_alone")))
         # between the hundredths that shares have
         assert bound <= case.deviation("small_slope") + 1e-4
-
-
-def test_every_grating_that_is_worse_than_kirchhoff_is_listed(sides, cases):
-    listed = {
-        (case.label, case.theta) for case in goals.against_kirchhoff(sides, "aluminium").worse
-    }
-    assert listed == {(case.label, case.theta) for case in cases if case.gain < -case.change}

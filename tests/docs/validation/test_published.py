@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from docs.make.validation.published import PUBLISHED, light_of
+from docs.make.validation.light import light_of
+from docs.make.validation.published import PUBLISHED
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.thorough
 
 def test_the_report_is_whole(tmp_path, capsys):
     folder = tmp_path / "docs"
-    assert main(["report", "--quick", "-o", str(folder)]) == 0
+    assert main(["--quick", "-o", str(folder)]) == 0
     printed = capsys.readouterr().out
     pictures = set()
     for name in PAGES:
@@ -32,7 +32,7 @@ def test_the_report_is_whole(tmp_path, capsys):
 
 
 def test_a_page_is_written_alone(tmp_path):
-    assert main(["report", "solutions", "--quick", "-o", str(tmp_path)]) == 0
+    assert main(["solutions", "--quick", "-o", str(tmp_path)]) == 0
     assert [path.name for path in tmp_path.rglob("*.md")] == ["solutions.md"]
 
 

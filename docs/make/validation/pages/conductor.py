@@ -22,9 +22,7 @@ def write(measured: Measurements) -> str:
 
 def _probe(measured: Measurements) -> str:
     grating = Grating(*PROBE_GRATING)
-    part = measured.perfect.where(
-        profile=grating.profile, period=grating.period, depth=grating.depth
-    )
+    part = measured.perfect.where(grating=grating)
     straight = part.where(theta=0.0)
     wavelength = straight.solutions.rows["wavelength"]
     to_550 = straight.select(wavelength <= 550).largest_relative()

@@ -6,6 +6,7 @@ import numpy as np
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
+from ..cells import chosen
 from ..compare import GRAZING, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope
 from ..models import ANGLES, of_colours
@@ -86,28 +87,22 @@ def _gratings(measured: Measurements) -> list[list[object]]:
             f"walls, depth/period up to {_LOW:g}": [g for g in walls if g.depth <= _LOW * g.period],
             f"walls, depth/period above {_LOW:g}": [g for g in walls if g.depth > _LOW * g.period],
         }
-        for name, chosen in groups.items():
-            if chosen:
+        for name, selected in groups.items():
+            if selected:
                 values = [
-                    table_of(measured.by_model[material, model], chosen, ANGLES, of_colours)
+                    table_of(measured.by_model[material, model], selected, ANGLES, of_colours)
                     for model in ("kirchhoff", "small_slope")
                 ]
                 oblique = [_mean_and_worst(v[:, 2]) for v in values]
                 steeper = [percent(float(np.nanmean(values[1][:, n]))) for n in (0, 1)]
-                rows.append([f"{material}, {name}", len(chosen), *oblique, *steeper])
+                rows.append([f"{material}, {name}", len(selected), *oblique, *steeper])
     return rows
 
 
 def _cells(measured: Measurements) -> list[list[object]]:
     rows = []
     for name, kinds, slope, material in _CELLS:
-        same = [
-            c
-            for c in measured.cells
-            if c.case.surface.kind in kinds
-            and c.case.surface.slope == slope
-            and c.case.material == material
-        ]
+        same = chosen(measured.cells, kinds, slope, material)
         oblique = [c.by_model for c in same if c.case.theta == 60.0]
         if not oblique:
             continue

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
@@ -11,7 +10,7 @@ from .. import goals, models
 from ..cases import Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope, slope_limit
-from .markdown import angle, percent, sentence_case, table
+from .markdown import angle, beside, percent, table
 from .measurements import Measurements
 
 
@@ -39,72 +38,32 @@ def _bands(measured: Measurements) -> str:
 
 Mean over the gratings, as Kirchhoff / small slope / blend.
 
-{_groups(measured.by_model)}
+{_banded(measured, ("kirchhoff", "small_slope_alone", "small_slope"), {"": models.of_colours})}
 
 For one polarisation, whose errors partly cancel in unpolarised light, as Kirchhoff / blend (TE: the
 electric field along the grooves):
 
-{_polarised_groups(measured.by_model)}"""
+{_banded(measured, ("kirchhoff", "small_slope"), {"TE ": models.of_te, "TM ": models.of_tm})}"""
 
 
-def _groups(sides: goals.Sides) -> str:
-    order = ("kirchhoff", "small_slope_alone", "small_slope")
-    return table(
-        ["grating", "depth/period", *map(angle, models.ANGLES)],
-        [
-            [
-                row.grating,
-                row.band,
-                *(" / ".join(map(percent, at)) for at in zip(*row.by_model, strict=True)),
-            ]
-            for row in _rows(sides, order, models.of_colours)
-        ],
-    )
-
-
-def _polarised_groups(sides: goals.Sides) -> str:
-    order = ("kirchhoff", "small_slope")
-    te, tm = (list(_rows(sides, order, measure)) for measure in (models.of_te, models.of_tm))
-    header = [f"{light} {angle(theta)}" for light in ("TE", "TM") for theta in models.ANGLES]
-    return table(
-        ["grating", "depth/period", *header],
-        [
-            [
-                row.grating,
-                row.band,
-                *(
-                    " / ".join(map(percent, at))
-                    for light in (row, other)
-                    for at in zip(*light.by_model, strict=True)
-                ),
-            ]
-            for row, other in zip(te, tm, strict=True)
-        ],
-    )
-
-
-class _Row(NamedTuple):
-    """Deviations of gratings of a material, profile and range of depth/period.
-
-    Attributes
-    ----------
-    by_model : deviations at `models.ANGLES`, for each model.
-    """
-
-    grating: str
-    band: str
-    by_model: list[list[float]]
-
-
-def _rows(
-    sides: goals.Sides, order: Sequence[str], measure: Callable[[Comparison], float]
-) -> Iterator[_Row]:
+def _banded(
+    measured: Measurements,
+    names: Sequence[str],
+    measures: Mapping[str, Callable[[Comparison], float]],
+) -> str:
+    """Table of deviations by models, for each material, profile and range of depth/period."""
+    rows = []
     for material in models.MATERIALS:
-        parts = [list(models.banded(sides[material, m], models.ANGLES, measure)) for m in order]
-        for same in zip(*parts, strict=True):
-            profile, (low, high), _ = same[0]
-            values = [deviations for _, _, deviations in same]
-            yield _Row(f"{material}, {profile}", f"{low:g} to {high:g}", values)
+        parts = [measured.by_model[material, name] for name in names]
+        columns = [
+            [list(models.banded(part, models.ANGLES, measure)) for part in parts]
+            for measure in measures.values()
+        ]
+        for n, (profile, (low, high), _) in enumerate(columns[0][0]):
+            cells = [c for by_model in columns for c in beside(*(part[n][2] for part in by_model))]
+            rows.append([f"{material}, {profile}", f"{low:g} to {high:g}", *cells])
+    header = [f"{light}{angle(theta)}" for light in measures for theta in models.ANGLES]
+    return table(["grating", "depth/period", *header], rows)
 
 
 def _slopes(measured: Measurements) -> str:
@@ -151,25 +110,27 @@ facets."""
             for material, part in measured.default.items()
             for grating in gratings_of(part, profile)
         ]
-        header = [sentence_case(profile), *map(angle, angles)]
+        header = [profile.capitalize(), *map(angle, angles)]
         parts.append(table(header, rows))
     return "\n\n".join(parts)
 
 
 def _aluminium(measured: Measurements) -> str:
-    against = goals.against_kirchhoff(measured.by_model, "aluminium")
+    by_model = goals.with_half(measured.by_model, "aluminium")
+    every = goals.singles(by_model)
+    better, worse = ([c for c in every if sign * c.gain > c.change] for sign in (1, -1))
     rows = []
-    for case in [*against.worse_bands, *against.worse]:
+    for case in [*(c for c in goals.whole_bands(by_model) if -c.gain > c.change), *worse]:
         share, best = case.with_one_share()
         pair = case.deviation("kirchhoff"), case.deviation("small_slope")
         values = [f"{100 * x:.2f} %" for x in (*pair, case.change, best, case.with_any_shares())]
         rows.append([case.label, angle(case.theta), *values[:3], f"{share:.2f}", *values[3:]])
     header = ["", "light from", "Kirchhoff", "blend", "change", "best share", "with it", "bound"]
-    gains = [100 * case.gain for case in against.every]
+    gains = [100 * case.gain for case in every]
     return f"""## Aluminium: blend against Kirchhoff
 
-Of {len(against.every)} gratings and angles the blend is better in {len(against.better)}, at best by
-{max(gains):.1f} points, and worse in {len(against.worse)}, at most by {-min(gains):.2f} points.
+Of {len(every)} gratings and angles the blend is better in {len(better)}, at best by
+{max(gains):.1f} points, and worse in {len(worse)}, at most by {-min(gains):.2f} points.
 Differences below the last refinement of the solver (*change*) do not count. Worse on average:
 
 {table(header, rows)}
@@ -217,4 +178,4 @@ def _side_by_side(
 ) -> list[str]:
     """Deviations of colours by both comparisons, a cell for each angle."""
     columns = (table_of(part, [grating], angles, models.of_colours)[0] for part in (first, second))
-    return [" / ".join(map(percent, pair)) for pair in zip(*columns, strict=True)]
+    return beside(*columns)

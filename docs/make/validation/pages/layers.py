@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..cases import COAT
 from ..filmed import ANGLES, GRATINGS, beyond
-from .markdown import angle, percent, table
+from .markdown import angle, beside, percent, table
 from .measurements import Measurements
 
 
@@ -46,8 +46,9 @@ def _film(measured: Measurements) -> str:
     rows = []
     for film in measured.films:
         for grating, *by_model in zip(GRATINGS, film.kirchhoff, film.default, strict=True):
-            cells = [" / ".join(map(percent, angles)) for angles in zip(*by_model, strict=True)]
-            rows.append([film.stack.name, f"{grating.period:g}/{grating.depth:g} µm", *cells])
+            rows.append(
+                [film.stack.name, f"{grating.period:g}/{grating.depth:g} µm", *beside(*by_model)]
+            )
     stacks = [film.stack for film in measured.films]
     sizes = [[s.name, f"{s.film:g}", f"{s.thickness:g} nm"] for s in stacks]
     thick = [[f"{b.thickness:g} nm", f"2.5/{b.depth:g} µm", percent(b.deviation)] for b in beyond()]

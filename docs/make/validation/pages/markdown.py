@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
 
+from docs.make.figures import pages
 
-def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A table whose columns but the first are aligned to the right."""
-    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+#: Table whose columns but the first are aligned to the right.
+table = partial(pages.table, right=True)
 
 
 def percent(value: float) -> str:
@@ -28,11 +28,11 @@ def angle(degrees: float) -> str:
     return f"{degrees:g}°".replace("-", "−")
 
 
+def beside(*columns: Iterable[float]) -> list[str]:
+    """Cells with the numbers of several columns in per cent: 1 % / 2 %."""
+    return [" / ".join(map(percent, values)) for values in zip(*columns, strict=True)]
+
+
 def joined(values: Sequence[float]) -> str:
     """Numbers as a sentence has them: 1, 2 and 3."""
     return ", ".join(f"{value:g}" for value in values[:-1]) + f" and {values[-1]:g}"
-
-
-def sentence_case(text: str) -> str:
-    """Text with its first letter in upper case."""
-    return text[:1].upper() + text[1:]

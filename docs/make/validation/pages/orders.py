@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .. import orders, stacks
-from ..published import Published
+from ..published import PUBLISHED, Published
 from .markdown import percent, table
 from .measurements import Measurements
 
 
 def write(measured: Measurements) -> str:
     """Write the page."""
+    cases = [orders.Case(name) for name in orders.TABLES[: measured.most(1)]]
+    mounts = orders.MOUNTS[: measured.most(1)]
+    samples = measured.most(4) or orders.SAMPLES
     diffuse = [
         [case.name, row.light, *map(percent, row[1:])]
-        for case in measured.solved_orders
-        for row in case.diffuse(measured.diffuse_samples)
+        for case in cases
+        for row in case.diffuse(samples)
     ]
     header = ["table", "light", "colours", "absorbed", "bias", "mean", "95 %", "largest"]
     return f"""# Solved orders
@@ -21,7 +26,7 @@ def write(measured: Measurements) -> str:
 The shipped tables of `diffraction_orders` and the default model, beside independent solutions
 ([orders.md](../orders.md)). All are aluminium; `cd` and `dvd` are lamellar, under polycarbonate.
 
-{_deviations(measured)}
+{_deviations(cases, mounts)}
 
 θ and φ are the light's in air, φ from the direction across the grooves. Wavelengths are
 {", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS)} nm. [Colours](../validation.md) are all orders
@@ -34,11 +39,11 @@ The tables are solved by a boundary integral method, the independent solutions b
 
 Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpolarised light.
 
-{_side_by_side(measured)}
+{_side_by_side(cases, mounts)}
 
 ## Interpolation
 
-The tables beside their own solver, at {measured.diffuse_samples}
+The tables beside their own solver, at {samples}
 random directions of diffuse light and wavelengths.
 *Absorbed* is the share of light in no order, *bias* the relative deviation of its mean. The last
 three columns are the deviation of *absorbed* as a share of the incident light.
@@ -54,7 +59,7 @@ Efficiencies from Johnson 2005 (for Li 1993), Granet and Guizal 1996, Lalanne an
 RETICOLO V10: s and p across the grooves, u unpolarised. The tolerance is the rounding of the
 printed digits, or the error of the printed method.
 
-{_published(measured.published)}
+{_published(PUBLISHED[1:2] if measured.quick else PUBLISHED)}
 
 ## Films, layers, blocks and crossed gratings
 
@@ -63,10 +68,10 @@ printed digits, or the error of the printed method.
 Measured gratings: [measured.md](measured.md)."""
 
 
-def _deviations(measured: Measurements) -> str:
+def _deviations(cases: Sequence[orders.Case], mounts: Sequence[tuple[int, int]]) -> str:
     rows = []
-    for case in measured.solved_orders:
-        for theta, phi in measured.mounts:
+    for case in cases:
+        for theta, phi in mounts:
             model, solved = case.deviations(theta, phi)
             values = (model.colours, solved.colours, model.sum, solved.sum)
             rows.append([case.name, f"{theta}°, {phi}°", *map(percent, values)])
@@ -76,14 +81,14 @@ def _deviations(measured: Measurements) -> str:
     return table(header, rows)
 
 
-def _side_by_side(measured: Measurements) -> str:
+def _side_by_side(cases: Sequence[orders.Case], mounts: Sequence[tuple[int, int]]) -> str:
     rows = []
-    for case in measured.solved_orders:
-        for theta, phi in measured.mounts:
-            for order in case.side_by_side(theta, phi):
-                number = f"{order.order}".replace("-", "−")
-                values = [f"{v:.4f}" for v in (order.model, order.table, order.truth)]
-                rows.append([case.name, f"{theta}°, {phi}°", number, *values])
+    for case in cases:
+        for theta, phi in mounts:
+            row = case.side_by_side(theta, phi)
+            for order, *values in zip(row.order, row.model, row.table, row.truth, strict=True):
+                number = f"{order}".replace("-", "−")
+                rows.append([case.name, f"{theta}°, {phi}°", number, *(f"{v:.4f}" for v in values)])
     return table(["table", "θ, φ", "order", "default", "solved", "truth"], rows)
 
 

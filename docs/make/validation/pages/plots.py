@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import functools
+from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 from ..cases import PROFILES, Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, rms_slope
+from ..models import of_colours
 from ..statistics import Statistics
 from .markdown import percent
 
@@ -31,10 +33,9 @@ def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Compariso
             (kirchhoff[material], "s", "none", "Kirchhoff"),
             (blend, "o", None, "default"),
         ):
-            measure = functools.partial(Comparison.deviation, colours=True)
-            table = np.maximum(table_of(part, sinusoids, angles, measure), _SMALLEST)
+            table = np.maximum(table_of(part, sinusoids, angles, of_colours), _SMALLEST)
             for column, (theta, colour) in enumerate(
-                zip(angles, _shades(len(angles)), strict=True)
+                zip(angles, colormaps["viridis"](np.linspace(0, 0.9, len(angles))), strict=True)
             ):
                 panel.loglog(
                     slopes, table[:, column], marker, ms=5, color=colour, mfc=fill,
@@ -55,8 +56,7 @@ def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Compariso
             [0.02, 0.05, 0.1, 0.2, 0.5, 1], labels=["0.02", "0.05", "0.1", "0.2", "0.5", "1"]
         )
         panel.set_xticks([], minor=True)
-        panel.grid(alpha=0.2)
-        panel.legend(title="model, incidence", loc="lower right", fontsize=8)
+        _frame(panel, title="model, incidence", loc="lower right")
     figure.suptitle(
         "Sinusoids beside the integral method. Dotted: where warnings begin; "
         f"deviations below {percent(_SMALLEST)} are drawn at it"
@@ -68,9 +68,7 @@ def orders_figure(comparison: Comparison, gratings: list[Grating], theta: float)
     """Efficiencies of the strongest orders against wavelength: both polarisations and the model."""
     figure, axes = _figure(4.6 * len(gratings), 4.4, len(gratings))
     for panel, grating in zip(axes, gratings, strict=True):
-        part = comparison.where(
-            profile=grating.profile, period=grating.period, depth=grating.depth, theta=theta
-        )
+        part = comparison.where(grating=grating, theta=theta)
         rows = part.solutions.rows
         strongest = sorted(
             {int(m) for m in rows["order"]},
@@ -93,8 +91,7 @@ def orders_figure(comparison: Comparison, gratings: list[Grating], theta: float)
             title=_title(grating),
         )  # fmt: skip
         panel.title.set_fontsize(10)
-        panel.legend(fontsize=8)
-        panel.grid(alpha=0.2)
+        _frame(panel)
     figure.suptitle(
         f"Perfect conductor, incidence {theta:g}°: rigorous TE (dashed), TM (dotted), "
         "mean (solid); model (circles)"
@@ -125,8 +122,7 @@ def scatter_figure(comparisons: list[Comparison]) -> Figure:
             xlabel="rigorous efficiency", ylabel="model",
         )  # fmt: skip
         panel.set_aspect("equal")
-        panel.grid(alpha=0.2)
-        panel.legend(fontsize=8, markerscale=2, loc="upper left")
+        _frame(panel, markerscale=2, loc="upper left")
     figure.suptitle(
         f"Every order, unpolarised; strong colours: depth/period up to "
         f"{_GENTLE_RATIO:g}, incidence up to 30°"
@@ -153,8 +149,7 @@ def _specular(axes: Axes, statistics: Statistics) -> None:
     )  # fmt: skip
     axes.semilogy(points.kappa_rms, points.exact, "_", ms=14, color="C3", label="with scattering")
     axes.set(xlabel="κ·rms", ylabel="mean power of order 0, |a₀|²", title="specular loss")
-    axes.legend(fontsize=8)
-    axes.grid(alpha=0.2)
+    _frame(axes)
 
 
 def _lobes(axes: Axes, statistics: Statistics) -> None:
@@ -170,8 +165,7 @@ def _lobes(axes: Axes, statistics: Statistics) -> None:
         title=f"incidence {lobe.theta:g}°, {lobe.wavelength:g} nm, T = "
         f"{lobe.roughness.correlation:g} µm",
     )  # fmt: skip
-    axes.legend(fontsize=8)
-    axes.grid(alpha=0.2)
+    _frame(axes)
 
 
 def _offsets(axes: Axes, statistics: Statistics) -> None:
@@ -209,10 +203,9 @@ def _title(grating: Grating) -> str:
     return str(grating) if edges else f"{grating}, RMS slope {rms_slope(grating):.2f}"
 
 
-def _shades(n: int) -> NDArray[np.float64]:
-    from matplotlib import colormaps
-
-    return np.asarray(colormaps["viridis"](np.linspace(0, 0.9, n)))
+def _frame(axes: Axes, **legend: Any) -> None:
+    axes.grid(alpha=0.2)
+    axes.legend(fontsize=8, **legend)
 
 
 def _figure(width: float, height: float, panels: int) -> tuple[Figure, list[Axes]]:

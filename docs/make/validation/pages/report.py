@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
 from docs.make.figures.long_tables import write_page
-from mitsuba_diffraction.atomic import atomic_path
+from docs.make.figures.pages import write_figure, write_text
 from mitsuba_diffraction.progress import Progress, silent
 
 from ..cases import PROBE_GRATING, Grating
@@ -97,23 +96,10 @@ def write_report(
         tell(n, len(names), f"writing {paths[-1].name}")
         if name in _PICTURES:
             picture, draw = _PICTURES[name]
-            _write_figure(draw(measured), folder / "images" / f"validation_{picture}.png")
+            write_figure(folder / "images" / f"validation_{picture}.png", draw(measured), _DPI)
         text = PAGES[name](measured)
         # the front page's tables say the most
-        write = _write_text if name == "validation" else write_page
+        write = write_text if name == "validation" else write_page
         write(paths[-1], text + "\n")
     tell(len(names), len(names), "done")
     return paths
-
-
-def _write_text(path: Path, text: str) -> None:
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-
-
-def _write_figure(figure: Figure, path: Path) -> None:
-    # without the name of the software that wrote it, equal pictures are equal files
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(buffer.getvalue())

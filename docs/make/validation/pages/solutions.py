@@ -35,8 +35,8 @@ $$
 with N of [theory.md](../theory.md). Comparisons have $\eta_m$ from `md.reference.brdf` at the
 centre of the lobe, before energy is conserved.
 
-`python -m docs.make.validation solve`, `patches`, `coated` and `films` (extra `validation`) compute
-the solutions in docs/make/validation/data."""
+`python -m docs.make.validation.solve` (extra `validation`) computes the solutions in
+docs/make/validation/data."""
 
 
 def _gratings() -> str:

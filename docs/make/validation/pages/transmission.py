@@ -9,7 +9,7 @@ from mitsuba_diffraction.analysis.energy import PASSED
 
 from .. import transmitted
 from ..compare import GRAZING
-from .markdown import angle, percent, table
+from .markdown import angle, beside, percent, table
 from .measurements import Measurements
 
 #: Largest depth over period of a sinusoid of slope 0.1.
@@ -28,18 +28,17 @@ def write(measured: Measurements) -> str:
 
 
 def _orders(measured: Measurements) -> str:
+    compared = transmitted.deviations(transmitted.GRATINGS[: measured.most(1)])
     rows = [
         [
             f"{one.grating.period:g}/{one.grating.depth:g} µm",
             angle(one.azimuth),
-            *(" / ".join(map(percent, at)) for at in zip(*one.by_model, strict=True)),
+            *beside(*one.by_model),
         ]
-        for one in measured.transmitted
+        for one in compared
     ]
     gentle = [
-        one.by_model[-1]
-        for one in measured.transmitted
-        if one.grating.depth / one.grating.period < _GENTLE
+        one.by_model[-1] for one in compared if one.grating.depth / one.grating.period < _GENTLE
     ]
     normal, worst = max(at[0] for at in gentle), max(max(at) for at in gentle)
     header = ["sinusoid", "azimuth", *map(angle, transmitted.ANGLES)]
@@ -62,7 +61,7 @@ def _surfaces(measured: Measurements) -> str:
             f"{one.medium}, {one.side}",
             *(f"{_span(one.model[at])} → {_span(one.conserved[at])}" for at in one.model),
         ]
-        for one in measured.sums_of_surfaces
+        for one in transmitted.sums_of_surfaces(list(transmitted.SURFACES)[: measured.most(1)])
     ]
     return f"""## Reflected and transmitted light
 
@@ -77,9 +76,9 @@ Missing light is shared by all orders."""
 
 def _recipes(measured: Measurements) -> str:
     rows = []
-    for (name, medium), group in groupby(
-        measured.sums_of_recipes, key=lambda one: (one.surface, one.medium)
-    ):
+    recipes = [p for p in transmitted.PRECOMPUTE if not measured.quick or p.stem == "cd"]
+    sums = transmitted.sums_of_recipes(recipes)
+    for (name, medium), group in groupby(sums, key=lambda one: (one.surface, one.medium)):
         sides = list(group)
         spans = (
             [span for one in sides for span in getattr(one, kind).values()]
