@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.support.directions import as_single
-from tests.support.kinds import KINDS, THROUGH, exact, lit, made
+from tests.support.kinds import KINDS, MIX, THROUGH, exact, lit, made
 from tests.support.variants import evaluate, runs
 
 #: Of places on the surface there is no light without wavelengths.
-COLOURED = [kind for kind in KINDS if kind != "surface"]
+COLOURED = [kind for kind in KINDS if "surface" not in kind]
 
 
 def check(kind: str, count: int) -> None:
@@ -45,7 +45,7 @@ def test_a_kind_is_the_reference_s(some_variant, kind):
     check(kind, 60)
 
 
-@pytest.mark.parametrize("kind", [*COLOURED, *THROUGH, "blended patches"])
+@pytest.mark.parametrize("kind", [*COLOURED, *THROUGH, MIX])
 def test_a_kind_agrees_with_itself_in_colours_without_kernels(kind):
     if not runs("scalar_rgb"):
         pytest.skip("scalar_rgb is not here")
@@ -54,7 +54,7 @@ def test_a_kind_agrees_with_itself_in_colours_without_kernels(kind):
 
 
 @pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
-@pytest.mark.parametrize("kind", ["metal", *THROUGH, "blended patches"])
+@pytest.mark.parametrize("kind", ["metal", *THROUGH, MIX])
 def test_directions_and_samples_are_taken_as_lists(variant, kind):
     if not runs(variant):
         pytest.skip(f"{variant} is not here")
