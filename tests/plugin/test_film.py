@@ -17,7 +17,7 @@ from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import as_single, polar
 from tests.support.lanes import evaluated, interaction
-from tests.support.layered import FLAT, PATCH, load, pairs
+from tests.support.layered import FLAT, load, pairs
 from tests.support.variants import evaluate
 
 pytestmark = pytest.mark.thorough
@@ -25,15 +25,6 @@ pytestmark = pytest.mark.thorough
 OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}
 METAL = {"eta": 0.9, "k": 6.0}
 GLASS = {"int_ior": 1.56, "ext_ior": 1.0}
-
-
-def test_a_height_scale_is_as_heights(some_variant):
-    wi, wo, lam = pairs(100)
-    half = md.HeightField(0.5 * PATCH.heights, PATCH.pixel_size)
-    scaled = evaluated(load(height_scale=0.5, **METAL, **OXIDE), wi, wo, lam)
-    lower = evaluated(load(half, **METAL, **OXIDE), wi, wo, lam)
-    # both tables' tolerance, as above
-    assert scaled == pytest.approx(lower, rel=2e-3, abs=2e-5 * lower.max())
 
 
 @pytest.mark.parametrize("material", [METAL, GLASS], ids=["metal", "dielectric"])
@@ -138,20 +129,6 @@ def test_a_texture_s_thickness_is_the_number_s(every_variant, material):
         # in RGB variants the thickest film tells how many wavelengths stand for a channel
         tolerance = 2e-2 if mi.is_rgb else 1e-4
         assert np.abs(one - other).sum() < tolerance * np.abs(other).sum()
-
-
-def test_the_texture_is_read_at_the_point(some_variant):
-    ends = {"film_thickness_max": 400.0}
-    textured = load(**METAL, film_ior=1.6, film_thickness=shares(0.25, 1.0), **ends)
-    wi = np.tile(as_single(polar(20.0)), (2, 1))
-    si = interaction(wi, 550.0)
-    si.uv = mi.Point2f([0.25, 0.75], 0.5)
-    wo = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z)
-    found = np.array(textured.eval(mi.BSDFContext(), si, wo))[0]
-    for at, thickness in enumerate((100.0, 400.0)):
-        number = load(**METAL, film_ior=1.6, film_thickness=thickness)
-        expected = np.array(number.eval(mi.BSDFContext(), si, wo))[0][at]
-        assert found[at] == pytest.approx(expected, rel=1e-4)
 
 
 def test_a_picture_s_name_stands_for_its_texture(some_variant, tmp_path):

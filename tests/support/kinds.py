@@ -23,7 +23,6 @@ SLOPE = {"model": "small_slope"}
 PLACED = {"coherence": "surface", "place": (0.0, 0.0)}
 
 
-
 class Kind(NamedTuple):
     """Parameters of the plugin, and of the reference where it knows the kind.
 
