@@ -35,6 +35,9 @@ def check(kind: str, count: int) -> None:
     assert density[valid] == pytest.approx(dense[valid], rel=1e-3)
     product = (weight * density[:, None])[valid]
     assert product == pytest.approx(there[valid], rel=2e-3, abs=1e-5 * np.abs(there).max())
+    if kind == "pigment":
+        parts = (evaluate(bsdf, wi, wo, samples, lam, component)[0] for component in (0, 1))
+        assert sum(parts) == pytest.approx(value, rel=1e-5)
     if mi.is_spectral and (expected := exact(kind, wi, wo, lam)) is not None:
         # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
         assert value == pytest.approx(expected, rel=1e-3, abs=1e-5 * expected.max())
