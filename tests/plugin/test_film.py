@@ -27,20 +27,6 @@ METAL = {"eta": 0.9, "k": 6.0}
 GLASS = {"int_ior": 1.56, "ext_ior": 1.0}
 
 
-@pytest.mark.parametrize("material", [METAL, GLASS], ids=["metal", "dielectric"])
-@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
-def test_films_that_are_none_leave_the_surface_bare(some_variant, material, model):
-    wi, wo, lam = pairs(60)
-    bare = evaluated(load(model=model, **material), wi, wo, lam)
-    for film in (
-        {"film_ior": 1.8, "film_thickness": 0.0},
-        {"film_ior": 1.0, "film_thickness": 300.0},
-    ):
-        filmed = evaluated(load(model=model, **material, **film), wi, wo, lam)
-        # of sums that cancel, in single precision
-        assert filmed == pytest.approx(bare, rel=5e-5, abs=2e-6 * bare.max())
-
-
 @pytest.mark.parametrize(
     ("depth", "thickness", "warned"),
     [(0.08, 700.0, True), (0.06, 700.0, False), (0.1, 400.0, False)],

@@ -31,6 +31,21 @@ def test_values_are_the_reference_s(some_variant, kind):
     assert evaluated(bsdf, wi, wo, lam) == pytest.approx(expected, **bound)
 
 
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+@pytest.mark.parametrize("kind", ["metal", "dielectric"])
+def test_layers_that_are_none_leave_the_surface_bare(some_variant, kind, model):
+    wi, wo, lam = lit(kind, 60)
+    bare = evaluated(made(kind, model=model), wi, wo, lam)
+    for layer in (
+        {"coat_ior": 1.0},
+        {"film_ior": 1.8, "film_thickness": 0.0},
+        {"film_ior": 1.0, "film_thickness": 300.0},
+    ):
+        covered = evaluated(made(kind, model=model, **layer), wi, wo, lam)
+        # of sums that cancel, in single precision
+        assert covered == pytest.approx(bare, rel=5e-5, abs=2e-6 * bare.max())
+
+
 @pytest.mark.parametrize("kind", ALL)
 def test_reciprocity(some_variant, kind):
     wi, wo, lam = lit(kind, 200)

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction import DiffractionTable, gratings
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.plugin import materials
 from mitsuba_diffraction.tables.colour.table import ColourTable
@@ -65,6 +65,20 @@ def test_a_picture_of_directions_turns_as_degrees_do(every_variant: str) -> None
     )
     # the angle's sine in single precision, times kσ = 20
     assert turned == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
+
+
+@pytest.mark.parametrize("name", [name for name in ALL if name.endswith("rgb")])
+def test_colours_of_the_spectrum_are_outside_the_displays_gamut(name: str) -> None:
+    if not runs(name):
+        pytest.skip(f"{name}: Dr.Jit finds no device for it")
+    mi.set_variant(name)
+    grating = gratings.blazed(period=2.0, depth=0.25, periods=6, rows=8)
+    x = np.linspace(0.2, 0.35, 8)  # order 1, from 400 to 700 nm
+    wi, wo = np.tile([0.0, 0.0, 1.0], (8, 1)), np.stack([x, 0.0 * x, np.sqrt(1.0 - x**2)], axis=1)
+    bsdf = load(grating, material="none", coherence_width=12.0, tolerance=1e-3)
+    value = evaluate(bsdf, wi, wo, np.full((8, 3), 0.5), np.zeros((8, 4)))[0]
+    # the sRGB red of 500 nm light is −0.36 times its green
+    assert value[:, 0].min() < -0.2 * value[:, 1].max()
 
 
 def test_gold_has_the_colour_of_its_spectrum(monkeypatch: pytest.MonkeyPatch) -> None:
