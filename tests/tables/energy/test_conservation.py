@@ -13,9 +13,31 @@ from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar, rough_patch
-from tests.support.reflecting import ALUMINIUM, MATERIALS, grating, index_of, rough
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+
+ALUMINIUM = 0.96 + 6.69j  # at 550 nm (Rakić 1995)
+MATERIALS = {
+    "dielectric": ("small_slope", 1.5 + 0j),
+    "aluminium": ("small_slope", ALUMINIUM),
+    "perfect": ("kirchhoff", None),
+}
+
+
+def grating(depth: float = 0.2) -> md.HeightField:
+    x = np.arange(32) * (1.6 / 32)
+    return md.HeightField(
+        np.tile(0.5 * depth * np.cos(2 * np.pi * x / 1.6), (8, 1)), 0.05, periodic=True
+    )
+
+
+def rough() -> md.HeightField:
+    rng = np.random.default_rng(4)
+    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(96, 0.125), np.fft.fftfreq(96, 0.125)))
+    spectrum = np.fft.fft2(rng.standard_normal((96, 96))) * np.exp(-((frequency / 0.9) ** 2))
+    heights = np.fft.ifft2(spectrum).real
+    return md.HeightField(0.08 * heights / heights.std(), 0.125)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +55,7 @@ def raw_albedo(table, theta, phi, wavelength, material):
 
 
 def reflector(model, index):
-    return Reflector(model, index_of(index))
+    return Reflector(model, lambda lam: None if index is None else np.full(len(lam), index))
 
 
 @pytest.mark.parametrize("material", MATERIALS)
