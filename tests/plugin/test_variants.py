@@ -7,8 +7,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionTable, gratings
-from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
+from mitsuba_diffraction import DiffractionTable, gratings, reference
+from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, delta_e, linear_srgb, response
 from mitsuba_diffraction.plugin import materials
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import Array
@@ -79,6 +79,26 @@ def test_colours_of_the_spectrum_are_outside_the_displays_gamut(name: str) -> No
     value = evaluate(bsdf, wi, wo, np.full((8, 3), 0.5), np.zeros((8, 4)))[0]
     # the sRGB red of 500 nm light is −0.36 times its green
     assert value[:, 0].min() < -0.2 * value[:, 1].max()
+
+
+def test_in_rgb_a_channel_has_the_boundary_of_one_wavelength() -> None:
+    if not runs("llvm_ad_rgb"):
+        pytest.skip("llvm_ad_rgb: Dr.Jit finds no device for it")
+    mi.set_variant("llvm_ad_rgb")
+    wi, wo, lam = pairs(24)
+    samples = np.full((len(wi), 3), 0.5)
+    small, mirror = (
+        evaluate(load(**given), wi, wo, samples, lam)[0] for given in ({}, {"material": "none"})
+    )
+    for n, one in enumerate(RGB_WAVELENGTHS):
+        exact, perfect = (
+            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, **given)
+            for given in ({"model": "small_slope", "eta": 1.5 / 1.000277}, {})
+        )
+        bright = (perfect > 1e-4 * perfect.max()) & (np.abs(mirror[:, n]) > 1e-4 * mirror.max())
+        assert bright.sum() > len(wi) // 4
+        found = small[bright, n] / mirror[bright, n]
+        assert found == pytest.approx((exact / perfect)[bright], rel=1e-3)
 
 
 def test_gold_has_the_colour_of_its_spectrum(monkeypatch: pytest.MonkeyPatch) -> None:
