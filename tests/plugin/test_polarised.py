@@ -12,8 +12,9 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from tests.support.directions import Array, as_single, polar, rough_patch, uniform_directions
+from tests.support.lanes import interaction, vectors
 from tests.support.stokes import REVERSAL, bases, rotation
-from tests.support.variants import interaction, runs
+from tests.support.variants import runs
 
 pytestmark = pytest.mark.thorough
 
@@ -57,9 +58,9 @@ def matrices(bsdf: Any, wi: Array, wo: Array, mode: Any = None) -> Array:
 
     if dr.is_jit_v(mi.Float):
         lam = np.tile(LAM, (len(wi), 1))
-        return np.moveaxis(once(interaction(wi, lam), mi.Vector3f(wo.T)), (3, 2), (0, 1))
+        return np.moveaxis(once(interaction(wi, lam), vectors(wo)), (3, 2), (0, 1))
     rows = [
-        np.moveaxis(once(interaction(i, LAM), mi.Vector3f(o.tolist())), 2, 0)
+        np.moveaxis(once(interaction(i, LAM), vectors(o)), 2, 0)
         for i, o in zip(wi, wo, strict=True)
     ]
     return np.stack(rows)
@@ -108,8 +109,7 @@ def test_a_flat_patch_s_specular_light_is_mitsuba_s(polarised, ours, theirs, mod
         found = matrices(bsdf, wi, wo, mode) / matrices(mirror, wi, wo, mode)[..., :1, :1]
         context = mi.BSDFContext(mode)
         context.component = 0
-        scalar = not dr.is_jit_v(mi.Float)
-        si = interaction(wi[0], LAM) if scalar else interaction(wi, LAM[None])
+        si = interaction(wi, LAM[None])
         weight = np.array(smooth.sample(context, si, 0.5, mi.Point2f(0.5))[1], float)
         weight = np.moveaxis(weight.reshape(4, 4, 4), 2, 0)
         assert found[0] == pytest.approx(weight, abs=1e-4)
@@ -126,8 +126,8 @@ def test_through_a_flat_dielectric_specular_light_is_mitsuba_s(polarised, mode, 
             flat, plugin="diffraction_dielectric", coherence_width=65.0, **n
         ),  # far from the horizon
     )
-    wi, scalar = as_single(polar(theta, 70.0))[None], not dr.is_jit_v(mi.Float)
-    si = interaction(wi[0], LAM) if scalar else interaction(wi, LAM[None])
+    wi = as_single(polar(theta, 70.0))[None]
+    si = interaction(wi, LAM[None])
     for component in (0, 1):
         context = mi.BSDFContext(mode)
         context.component = component
@@ -171,7 +171,7 @@ def test_the_first_entry_of_light_on_all_sides_is_that_of_unpolarised_variants(p
     bsdf, lam = load(**given), np.tile(LAM, (len(wi), 1))
     for one, (there, back) in zip(found, cases, strict=True):
         si = interaction(there, lam)
-        expected = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(back.T)), float).T
+        expected = np.array(bsdf.eval(mi.BSDFContext(), si, vectors(back)), float).T
         assert one == pytest.approx(expected, rel=1e-4, abs=1e-6 * expected.max())
 
 

@@ -12,8 +12,9 @@ from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, delta_e, linear_s
 from mitsuba_diffraction.plugin import materials
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import Array
+from tests.support.lanes import interaction
 from tests.support.layered import PATCH, WIDTH, load, pairs
-from tests.support.variants import ALL, evaluate, interaction, runs
+from tests.support.variants import ALL, evaluate, runs
 
 pytestmark = pytest.mark.thorough
 
