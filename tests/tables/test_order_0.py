@@ -74,18 +74,6 @@ def test_tables_of_a_small_scan_meet_their_tolerance(basis):
     assert difference[close].sum() < table.tolerance * scale[close].sum()
 
 
-def test_files_hold_the_window_of_a_scan_and_older_ones_have_one_window(tmp_path):
-    scan = md.DiffractionTable.build(SMALL_SCAN)
-    scan.save(tmp_path / "scan.exr")
-    loaded = md.DiffractionTable.load(tmp_path / "scan.exr")
-    assert (loaded.sigma, loaded.sigma_0) == (scan.sigma, scan.sigma_0)
-    assert loaded.digest() == scan.digest()
-    whole = SMALL_SCAN.treated(periodic="exact")
-    table = md.DiffractionTable.build(whole, coherence_width=4.5)
-    assert "window_width" not in table.settings.as_json()
-    assert table.sigma == table.sigma_0
-
-
 def rough_ridges(n, pixel):
     """Ridges 1.25 µm apart that waver, and roughness of all lengths: (n, n) heights in µm."""
     rng = np.random.default_rng(1)

@@ -13,6 +13,7 @@ from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar, rough_patch
+from tests.support.furnace import isotropic
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 
@@ -25,26 +26,15 @@ MATERIALS = {
 }
 
 
-def grating(depth: float = 0.2) -> md.HeightField:
-    x = np.arange(32) * (1.6 / 32)
-    return md.HeightField(
-        np.tile(0.5 * depth * np.cos(2 * np.pi * x / 1.6), (8, 1)), 0.05, periodic=True
-    )
-
-
-def rough() -> md.HeightField:
-    rng = np.random.default_rng(4)
-    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(96, 0.125), np.fft.fftfreq(96, 0.125)))
-    spectrum = np.fft.fft2(rng.standard_normal((96, 96))) * np.exp(-((frequency / 0.9) ** 2))
-    heights = np.fft.ifft2(spectrum).real
-    return md.HeightField(0.08 * heights / heights.std(), 0.125)
+GRATING = md.gratings.sinusoidal(1.6, 0.2, periods=1, pixels_per_period=32, rows=8)
+ROUGH = md.HeightField(0.08 * isotropic(96, 0.125, 0.9), 0.125)
 
 
 @pytest.fixture(scope="module")
 def tables():
     return {
-        "grating": md.DiffractionTable.build(grating()),
-        "rough": md.DiffractionTable.build(rough(), coherence_width=12.0),
+        "grating": md.DiffractionTable.build(GRATING),
+        "rough": md.DiffractionTable.build(ROUGH, coherence_width=12.0),
     }
 
 
@@ -73,7 +63,7 @@ def test_a_gratings_albedo_is_the_sum_of_its_efficiencies(tables, material, thet
         if x * x + y * y < 0.995:
             wo = np.array([x, y, np.sqrt(1.0 - x * x - y * y)])
             peak = reference.brdf(
-                grating(), wi, wo, wavelength, model=MATERIALS[material][0], **parameters
+                GRATING, wi, wo, wavelength, model=MATERIALS[material][0], **parameters
             )[0]
             # the lobe is exp(−σ²k²|Δ|²) in direction cosines, and cosθ dω is their area
             total += peak * np.pi * (lam / (2 * np.pi * sigma)) ** 2
@@ -122,10 +112,7 @@ def test_a_dielectric_gains_nothing_and_nothing_is_taken(tables, surface):
 
 
 def test_a_gentle_metal_gains_nothing_and_nothing_is_taken():
-    x = np.arange(32) * (2.5 / 32)
-    gentle = md.HeightField(
-        np.tile(0.02 * np.cos(2 * np.pi * x / 2.5), (8, 1)), 2.5 / 32, periodic=True
-    )
+    gentle = md.gratings.sinusoidal(2.5, 0.04, periods=1, pixels_per_period=32, rows=8)
     table = md.DiffractionTable.build(gentle)
     metal = SurfaceEnergy(table, reflector("small_slope", ALUMINIUM))
     found = metal.conservation((550.0, 550.0))
