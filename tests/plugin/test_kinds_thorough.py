@@ -9,20 +9,22 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.support.directions import Array, as_single, polar
-from tests.support.kinds import KINDS, MIX, MORE, THROUGH, exact, lit, made
+from tests.support.kinds import KINDS, MIX, MIXED_SHEETS, MORE, THROUGH, exact, lit, made
 from tests.support.lanes import evaluated, interaction
 from tests.support.variants import SOME, evaluate, runs
 
 pytestmark = pytest.mark.thorough
 
-ALL = [*KINDS, *MORE, *THROUGH, MIX]
+ALL = [*KINDS, *MORE, *THROUGH, MIX, MIXED_SHEETS]
 #: Layers that lose light also where the bare model, without conservation of energy, gains some.
 LOSING = [kind for kind in KINDS | MORE if kind.startswith(("coat", "film"))]
 # each kind in one variant, each variant with some kinds, without places in colours
 ELSEWHERE = [(SOME[n % len(SOME)], kind) for n, kind in enumerate(ALL) if "surface" not in kind]
 
 
-@pytest.mark.parametrize("kind", [kind for kind in MORE if MORE[kind].reference is not None])
+@pytest.mark.parametrize(
+    "kind", [*(kind for kind in MORE if MORE[kind].reference is not None), MIXED_SHEETS]
+)
 def test_values_are_the_reference_s(some_variant, kind):
     wi, wo, lam = lit(kind, 120)
     bsdf, expected = made(kind), exact(kind, wi, wo, lam)

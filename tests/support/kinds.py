@@ -80,15 +80,16 @@ THROUGH: dict[str, dict[str, Any]] = {
     **{f"through a {name}": parameters for name, parameters in SIDES.items()},
     "through a narrower dielectric": {"lateral_scale": 0.7},
 }
-MIX = "blended patches"
+#: Mixes of two equal parts; the sheets of `make test-all` alone.
+MIX, MIXED_SHEETS = "blended patches", "through blended sheets"
 
 
 def made(kind: str, field: md.HeightField = PATCH, **more: Any) -> Any:
     """The BSDF of a kind that reflects or transmits, or a mix, in the variant that is set."""
-    if kind == MIX:
-        own = {"coherence_width": WIDTH, "material": "none", "energy_conserving": False} | more
-        one = md.bsdf_dict(field, **own)
-        return mi.load_dict({"type": "diffraction_mix", "one": one, "two": one, "weight_one": 0.3})
+    if kind in (MIX, MIXED_SHEETS):
+        part = "mirror" if kind == MIX else "through a sheet"
+        one, two = (made(part, field, **more) for _ in range(2))
+        return mi.load_dict({"type": "diffraction_mix", "one": one, "two": two, "weight_one": 0.3})
     if kind in THROUGH:
         return both(field, wavelength=600.0, **THROUGH[kind], **more)
     parameters = (KINDS | MORE)[kind].parameters | more
@@ -102,11 +103,12 @@ def exact(kind: str, wi: Array, wo: Array, wavelengths: Array) -> Array | None:
 
     Radiance of what goes through is that of equal media on both sides.
     """
-    own, stretch, height, function = {}, 1.0, 1.0, reference.brdf
+    kind = {MIX: "mirror", MIXED_SHEETS: "through a sheet"}.get(kind, kind)
+    stretch, height, function = 1.0, 1.0, reference.brdf
     if kind in THROUGH:
         own = SLOPE | {"eta": 1.5} | THROUGH[kind]
         stretch, function = own.pop("lateral_scale", 1.0), reference.btdf
-    elif kind != MIX:
+    else:
         _, known, stretch, height = (KINDS | MORE)[kind]
         if known is None:
             return None
@@ -121,4 +123,4 @@ def exact(kind: str, wi: Array, wo: Array, wavelengths: Array) -> Array | None:
 def lit(kind: str, count: int) -> tuple[Array, Array, Array]:
     """Directions of light and eye, to where the kind sends light, and wavelengths (count, 4)."""
     wi, wo, lam = (part[:count] for part in pairs())
-    return wi, as_single(wo * BELOW) if kind in THROUGH else wo, lam
+    return wi, as_single(wo * BELOW) if kind.startswith("through") else wo, lam
