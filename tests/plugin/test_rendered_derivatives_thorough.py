@@ -23,11 +23,14 @@ def of_surface(name: str) -> tuple[str, ...]:
     return VARIANTS[::2] if name == "places" else VARIANTS
 
 
-#: Variants, surfaces and widths, µm: variants and widths by turns.
-CASES = [
-    (of_surface(name)[n % len(of_surface(name))], name, WIDTHS[n % 2])
-    for n, name in enumerate(SURFACES)
-]
+def case_of(n: int, name: str) -> tuple[str, str, float]:
+    """Variant, surface and width, µm, by turns; tables of colours are small where windows are."""
+    variants = of_surface(name)
+    variant = variants[n % len(variants)]
+    return variant, name, WIDTHS[0] if variant.endswith("rgb") else WIDTHS[n % 2]
+
+
+CASES = [case_of(n, name) for n, name in enumerate(SURFACES)]
 
 
 @pytest.mark.parametrize("name", SURFACES)
