@@ -54,13 +54,6 @@ def test_a_table_of_nodes_interpolates_to_it():
     assert table.at(0.0) < 1e-30
 
 
-def test_the_mean_of_several_is_that_of_their_variances():
-    other = ScaleRoughness.from_heights(2 * PATCH.heights, PATCH.pixel_size)
-    q = np.geomspace(0.1, 30.0, 20)
-    mean = ScaleRoughness.mean([roughness(), other])
-    assert mean.at(q) == pytest.approx(2.5 * roughness().at(q), rel=1e-12)
-
-
 def test_several_patches_have_the_mean_of_their_roughness():
     other = ScaleRoughness.from_heights(2 * PATCH.heights[:, ::-1], PATCH.pixel_size)
     q = np.geomspace(0.1, 35, 20)

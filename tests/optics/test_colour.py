@@ -8,6 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import (
     ILLUMINANTS,
+    RGB_WAVELENGTHS,
     delta_e,
     encode_srgb,
     linear_srgb,
@@ -40,6 +41,12 @@ def test_the_observer_is_brightest_at_555_nm_and_blind_beyond_the_visible():
 
 def test_monochromatic_light_is_outside_the_gamut_and_stays_there():
     assert linear_srgb(response(500.0)).min() < 0
+
+
+def test_the_wavelengths_of_rgb_are_the_means_of_its_channels():
+    weights = linear_srgb(response(EVERY_NM))
+    means = (weights * EVERY_NM[:, None]).sum(axis=0) / weights.sum(axis=0)
+    assert RGB_WAVELENGTHS == pytest.approx(means, abs=0.1)
 
 
 def test_shapes_and_precision_are_kept():

@@ -15,7 +15,7 @@ FLAT = md.HeightField(np.zeros((8, 8)), 0.2, periodic=True)
 THROUGH = {"plugin": "diffraction_dielectric", "int_ior": 1.5, "ext_ior": 1.0}
 #: nm: none, far below the table's 360, infrared, and far beyond.
 LIGHT = np.array([[0.0, 1.0, 300.0, 359.0], [550.0, 831.0, 900.0, 1600.0], [3e3, 1e4, 1e6, 1e9]])
-SPECTRAL = ["scalar_spectral", "llvm_ad_spectral", "llvm_ad_spectral_polarized"]
+SPECTRAL = ["scalar_spectral", "llvm_ad_spectral_polarized"]
 
 
 @pytest.mark.parametrize("variant", SPECTRAL)

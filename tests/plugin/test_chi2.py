@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import mitsuba as mi
 import pytest
 
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import rough_patch
+from tests.support.variants import runs
 
 DEFAULT = {"int_ior": 1.5, "energy_conserving": True}
 CASES = {
@@ -25,7 +27,17 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_density_is_that_of_the_samples(some_variant, name):
-    case = CASES[name]
+    assert_density_of_samples(CASES[name])
+
+
+def test_the_density_in_rgb_is_that_of_the_samples():
+    if not runs("llvm_ad_rgb"):
+        pytest.skip("llvm_ad_rgb: Dr.Jit finds no device for it")
+    mi.set_variant("llvm_ad_rgb")
+    assert_density_of_samples(Case(ROUGH, 50.0, (550.0,), SMALL))
+
+
+def assert_density_of_samples(case):
     test = chi_square(case.load(), case, samples=1 << 20)
     # 1 % for all cases together; the numbers drawn are always the same
     assert test.run(0.01, len(CASES), quiet=True), test.messages

@@ -13,6 +13,7 @@ from tests.support import gentle
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import polar, rough_patch
 from tests.support.lanes import interaction, lanes, spectra
+from tests.support.patches import SMALL_SCAN
 
 pytestmark = [
     pytest.mark.thorough,
@@ -65,6 +66,9 @@ CASES = {
     "mirror, 65 µm, its lobe": Case(
         md.HeightField(np.zeros((60, 60)), 0.085), 30.0, (550.0,), {}, (0.0, 0.0)
     ),
+    "small scan, the lobe of the light": Case(SMALL_SCAN, 30.0, (550.0,), {}, (0.0, 0.0)),
+    # a histogram of the hemisphere resolves lobes of 12 µm
+    "small scan, 12 µm, 30°": Case(SMALL_SCAN, 30.0, (550.0,), {"coherence_width": 12.0}),
     "sinusoid, 65 µm, dispersed": Case(sinusoid, 20.0, DISPERSED, {}, (PERIOD, 0.0)),
     "dispersed, 0°": Case(ROUGH, 0.0, DISPERSED, SMALL),
     "a made scale, 20 µm, 10°": Case(like_elaphe, 10.0, (550.0,), {"coherence_width": 20.0}),

@@ -11,44 +11,10 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import Array, as_single, polar
-from tests.support.lanes import evaluated, interaction, refusal
-from tests.support.layered import FLAT, PATCH, WIDTH, load, pairs
+from tests.support.lanes import interaction, refusal
+from tests.support.layered import FLAT, PATCH, WIDTH, load
 
 pytestmark = pytest.mark.thorough
-
-
-@pytest.mark.parametrize("parameters", [{"eta": 0.9, "k": 6.0}, {"int_ior": 1.6, "ext_ior": 1.0}])
-def test_a_coat_of_air_is_none(some_variant, parameters):
-    wi, wo, lam = pairs(60)
-    bare = evaluated(load(**parameters), wi, wo, lam)
-    coated = evaluated(load(coat_ior=1.0, **parameters), wi, wo, lam)
-    # √T of each polarisation, in single precision
-    assert coated == pytest.approx(bare, rel=2e-5, abs=1e-6 * bare.max())
-
-
-def test_a_coat_of_the_material_s_own_index_is_its_flat_face(some_variant):
-    wi, wo, lam = pairs(60)
-    coated = evaluated(load(int_ior=1.6, coat_ior=1.6, ext_ior=1.0), wi, wo, lam)
-    face = evaluated(load(FLAT, int_ior=1.6, ext_ior=1.0, model="kirchhoff"), wi, wo, lam)
-    lit = face > 1e-3 * face.max()
-    assert coated[lit] == pytest.approx(face[lit], rel=1e-3)  # the other's table, at its tolerance
-
-
-def test_a_coated_mirror_s_specular_light_is_that_of_both_faces(some_variant):
-    # R_coat + T² R / (1 − R_coat R), all bounces
-    mirror, bsdf = load(FLAT, material="none"), load(FLAT, eta=0.9, k=6.0, coat_ior=1.58)
-    for theta in (0.0, 40.0, 70.0):
-        wi = as_single(polar(theta))[None]
-        wo, cosine = wi * [-1, -1, 1], np.cos(np.radians(theta))
-        found = evaluated(bsdf, wi, wo, 550.0)[0] / evaluated(mirror, wi, wo, 550.0)[0]
-        inside = np.sqrt(1 - (1 - cosine**2) / 1.58**2)
-        face = reflectance(cosine, 1.58)
-        beneath = reflectance(inside, (0.9 + 6.0j) / 1.58)
-        # the lobe inside is wider by cosines' quotient, and its peak lower
-        bulk = (1 - face) ** 2 * beneath / (1 - face * beneath)
-        assert found[0] > face
-        if theta == 0.0:
-            assert found[0] == pytest.approx(face + bulk, rel=1e-3)
 
 
 @pytest.mark.parametrize("theta", [0.0, 45.0])

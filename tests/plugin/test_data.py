@@ -12,7 +12,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.support.directions import Array, rough_patch
-from tests.support.kinds import KINDS, THROUGH, lit, made
+from tests.support.kinds import KINDS, MIX, THROUGH, lit, made
 from tests.support.lanes import interaction, spectra, vectors
 from tests.support.layered import PATCH, load
 from tests.support.variants import runs
@@ -39,7 +39,7 @@ def set_heights(bsdf: Any, heights: Array) -> None:
     parameters.update()
 
 
-@pytest.mark.parametrize("kind", [*KINDS, *THROUGH, "blended patches"])
+@pytest.mark.parametrize("kind", [*KINDS, *THROUGH, MIX])
 def test_other_heights_are_as_if_loaded(some_variant, kind):
     bsdf, expected = made(kind), values(made(kind, SINGLE), kind)
     before = values(bsdf, kind)

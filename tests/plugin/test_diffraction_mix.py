@@ -76,23 +76,6 @@ def test_samples_add_up_to_the_value(variant, component):
     assert found.mean() == pytest.approx(expected, abs=noise)
 
 
-def test_densities_are_those_of_the_samples(variant):
-    wi, _, lam = pairs(1)
-    si = hits(np.repeat(wi, 500, axis=0), UV[3], np.repeat(lam, 500)[:, None])
-    rng = np.random.default_rng(2)
-    both, context = mix(weight_back=bitmap(WEIGHTS)), mi.BSDFContext()
-    drawn, weight = both.sample(
-        context, si, mi.Float(rng.random(500)), mi.Point2f(*rng.random((2, 500)).astype(np.float32))
-    )
-    value, density = both.eval_pdf(context, si, drawn.wo)
-    dr.eval(drawn, weight, value, density)  # one kernel instead of five
-    smooth = np.array(~mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)) & (drawn.pdf > 0.0)
-    assert np.array(density)[smooth] == pytest.approx(np.array(drawn.pdf)[smooth], rel=1e-4)
-    found = (spectra(weight) * np.array(drawn.pdf)[:, None])[smooth]
-    assert found == pytest.approx(spectra(value)[smooth], rel=1e-3, abs=1e-4 * float(found.max()))
-    assert set(np.array(drawn.sampled_component)) == {0, 1, 2}
-
-
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [
@@ -116,20 +99,3 @@ def test_weights_that_mean_nothing_are_refused(some_variant, parameters, said):
     made = {k: v() if callable(v) else v for k, v in (surfaces() | parameters).items()}
     given = {k: v for k, v in made.items() if v is not None}
     assert said in refusal(lambda: mi.load_dict({"type": "diffraction_mix", **given}))
-
-
-@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_spectral_polarized"])
-def test_other_variants_mix_too(name):
-    try:
-        mi.set_variant(name)
-        both, back = mix(weight_back=bitmap(WEIGHTS)), mi.load_dict(surfaces()["back"])
-        si = dr.zeros(mi.SurfaceInteraction3f)
-        si.wi, si.uv = mi.Vector3f(0.0, 0.0, 1.0), mi.Point2f(UV[0].tolist())
-        si.wavelengths = 550.0 if mi.is_spectral else []
-        sample, weight = both.sample(mi.BSDFContext(), si, 0.3, mi.Point2f(0.2, 0.6))
-        its, expected = back.sample(mi.BSDFContext(), si, 0.3, mi.Point2f(0.2, 0.6))
-        assert np.array(sample.wo).ravel() == pytest.approx(np.array(its.wo).ravel(), rel=1e-6)
-        one, other = (np.array(mi.unpolarized_spectrum(w)).ravel() for w in (weight, expected))
-        assert one == pytest.approx(other, rel=1e-5)
-    finally:
-        mi.set_variant("llvm_ad_spectral")

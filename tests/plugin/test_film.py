@@ -17,7 +17,7 @@ from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import as_single, polar
 from tests.support.lanes import evaluated, interaction
-from tests.support.layered import FLAT, PATCH, load, pairs
+from tests.support.layered import FLAT, load, pairs
 from tests.support.variants import evaluate
 
 pytestmark = pytest.mark.thorough
@@ -25,29 +25,6 @@ pytestmark = pytest.mark.thorough
 OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}
 METAL = {"eta": 0.9, "k": 6.0}
 GLASS = {"int_ior": 1.56, "ext_ior": 1.0}
-
-
-def test_a_height_scale_is_as_heights(some_variant):
-    wi, wo, lam = pairs(100)
-    half = md.HeightField(0.5 * PATCH.heights, PATCH.pixel_size)
-    scaled = evaluated(load(height_scale=0.5, **METAL, **OXIDE), wi, wo, lam)
-    lower = evaluated(load(half, **METAL, **OXIDE), wi, wo, lam)
-    # both tables' tolerance, as above
-    assert scaled == pytest.approx(lower, rel=2e-3, abs=2e-5 * lower.max())
-
-
-@pytest.mark.parametrize("material", [METAL, GLASS], ids=["metal", "dielectric"])
-@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
-def test_films_that_are_none_leave_the_surface_bare(some_variant, material, model):
-    wi, wo, lam = pairs(60)
-    bare = evaluated(load(model=model, **material), wi, wo, lam)
-    for film in (
-        {"film_ior": 1.8, "film_thickness": 0.0},
-        {"film_ior": 1.0, "film_thickness": 300.0},
-    ):
-        filmed = evaluated(load(model=model, **material, **film), wi, wo, lam)
-        # of sums that cancel, in single precision
-        assert filmed == pytest.approx(bare, rel=5e-5, abs=2e-6 * bare.max())
 
 
 @pytest.mark.parametrize(
@@ -140,20 +117,6 @@ def test_a_texture_s_thickness_is_the_number_s(every_variant, material):
         assert np.abs(one - other).sum() < tolerance * np.abs(other).sum()
 
 
-def test_the_texture_is_read_at_the_point(some_variant):
-    ends = {"film_thickness_max": 400.0}
-    textured = load(**METAL, film_ior=1.6, film_thickness=shares(0.25, 1.0), **ends)
-    wi = np.tile(as_single(polar(20.0)), (2, 1))
-    si = interaction(wi, 550.0)
-    si.uv = mi.Point2f([0.25, 0.75], 0.5)
-    wo = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z)
-    found = np.array(textured.eval(mi.BSDFContext(), si, wo))[0]
-    for at, thickness in enumerate((100.0, 400.0)):
-        number = load(**METAL, film_ior=1.6, film_thickness=thickness)
-        expected = np.array(number.eval(mi.BSDFContext(), si, wo))[0][at]
-        assert found[at] == pytest.approx(expected, rel=1e-4)
-
-
 def test_a_picture_s_name_stands_for_its_texture(some_variant, tmp_path):
     mi.Bitmap(np.full((2, 2), 51, np.uint8)).write(str(tmp_path / "thick.png"))  # 0.2
     wi, wo, lam = pairs(20)
@@ -192,8 +155,8 @@ def test_a_texture_s_derivative_is_that_of_differences(some_variant):
 
 @pytest.mark.parametrize("theta", [30.0, 75.0, 82.0])
 def test_no_thickness_of_a_texture_sends_on_more_light_than_it_gets(mono, theta):
-    grating = md.gratings.sinusoidal(1.6, 0.2, periods=10, pixels_per_period=24)
-    silver = {"eta": 0.05, "k": 4.0, "coherence_width": 16.0, "field": grating}
+    grating = md.gratings.sinusoidal(1.6, 0.2, periods=5, pixels_per_period=24)
+    silver = {"eta": 0.05, "k": 4.0, "coherence_width": 8.0, "field": grating}
     film = {"film_ior": 1.4, "film_thickness_max": 600.0, "film_thickness": shares(0.5)}
     bsdf = load(energy_conserving=True, wavelength=550.0, **silver, **film)
     parameters, rng = mi.traverse(bsdf), np.random.default_rng(3)

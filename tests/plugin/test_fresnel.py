@@ -61,16 +61,11 @@ def pairs():
     return wi[good], wo[good]
 
 
-def test_the_default_is_a_dielectric_like_shed_skin(variant, pairs):
-    eta = 1.5 / 1.000277
-    expected = dielectric(mirror_cosines(*pairs), eta)
-    # Fresnel's formulas in single precision
-    assert ratios(*pairs, 550.0)[:, 0] == pytest.approx(expected, rel=1e-5)
-
-
 @pytest.mark.parametrize(
     ("parameters", "eta"),
     [
+        ({}, 1.5 / 1.000277),
+        ({"int_ior": 1.0, "ext_ior": 1.0}, 1.0),
         ({"int_ior": 1.33}, 1.33 / 1.000277),
         ({"int_ior": 1.7, "ext_ior": 1.2}, 1.7 / 1.2),
         ({"int_ior": "diamond", "ext_ior": "vacuum"}, 2.419),
@@ -79,7 +74,9 @@ def test_the_default_is_a_dielectric_like_shed_skin(variant, pairs):
 )
 def test_dielectrics(some_variant, pairs, parameters, eta):
     expected = dielectric(mirror_cosines(*pairs), eta)
-    assert ratios(*pairs, 550.0, **parameters)[:, 0] == pytest.approx(expected, rel=1e-5)
+    # Fresnel's formulas in single precision
+    found = ratios(*pairs, 550.0, **parameters)[:, 0]
+    assert found == pytest.approx(expected, rel=1e-5, abs=1e-6 if eta == 1.0 else 0.0)
 
 
 def test_a_conductor_by_its_name_is_mitsuba_s(variant):
@@ -93,10 +90,6 @@ def test_a_conductor_by_its_name_is_mitsuba_s(variant):
     _, theirs = smooth.sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.5))
     assert ours == pytest.approx(spectra(theirs), rel=1e-4)  # the half vector, in single precision
     assert ours[0, 0] < 0.5 < ours[0, 3]  # gold is yellow
-
-
-def test_an_index_of_one_reflects_nothing(some_variant):
-    assert ratios(polar(30), [polar(30, 180)], 550.0, int_ior=1.0, ext_ior=1.0)[0, 0] < 1e-6
 
 
 @pytest.mark.parametrize(("material", "last"), [("MgO", 767.0), ("TiN", 826.0)])

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from tests.support.directions import as_single
-from tests.support.kinds import KINDS, THROUGH, exact, lit, made
+from tests.support.kinds import KINDS, MIX, THROUGH, exact, lit, made
 from tests.support.variants import evaluate, runs
 
 #: Of places on the surface there is no light without wavelengths.
-COLOURED = [kind for kind in KINDS if kind != "surface"]
+COLOURED = [kind for kind in KINDS if "surface" not in kind]
 
 
 def check(kind: str, count: int) -> None:
@@ -35,6 +35,9 @@ def check(kind: str, count: int) -> None:
     assert density[valid] == pytest.approx(dense[valid], rel=1e-3)
     product = (weight * density[:, None])[valid]
     assert product == pytest.approx(there[valid], rel=2e-3, abs=1e-5 * np.abs(there).max())
+    if kind == "pigment":
+        parts = (evaluate(bsdf, wi, wo, samples, lam, component)[0] for component in (0, 1))
+        assert sum(parts) == pytest.approx(value, rel=1e-5)
     if mi.is_spectral and (expected := exact(kind, wi, wo, lam)) is not None:
         # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
         assert value == pytest.approx(expected, rel=1e-3, abs=1e-5 * expected.max())
@@ -45,7 +48,7 @@ def test_a_kind_is_the_reference_s(some_variant, kind):
     check(kind, 60)
 
 
-@pytest.mark.parametrize("kind", [*COLOURED, *THROUGH, "blended patches"])
+@pytest.mark.parametrize("kind", [*COLOURED, *THROUGH, MIX])
 def test_a_kind_agrees_with_itself_in_colours_without_kernels(kind):
     if not runs("scalar_rgb"):
         pytest.skip("scalar_rgb is not here")
@@ -54,7 +57,7 @@ def test_a_kind_agrees_with_itself_in_colours_without_kernels(kind):
 
 
 @pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
-@pytest.mark.parametrize("kind", ["metal", *THROUGH, "blended patches"])
+@pytest.mark.parametrize("kind", ["metal", *THROUGH, MIX])
 def test_directions_and_samples_are_taken_as_lists(variant, kind):
     if not runs(variant):
         pytest.skip(f"{variant} is not here")

@@ -6,7 +6,6 @@ import gc
 import tracemalloc
 import weakref
 from collections.abc import Iterator
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -15,7 +14,8 @@ import pytest
 
 from mitsuba_diffraction.optics.colour import response
 from tests.support.directions import rough_patch
-from tests.support.plates import diffraction, grey, plate, rendered, scene
+from tests.support.kinds import KINDS, MIX, THROUGH, made
+from tests.support.plates import diffraction, plate, rendered, scene
 from tests.support.variants import obstacle
 
 # coarse pixels keep the tables small; that is not the point here
@@ -24,25 +24,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
 ]
 LOADED = ("scalar_spectral", "llvm_ad_spectral", "llvm_ad_rgb", "llvm_ad_mono")
-GLASS = {"material": None, "energy_conserving": True}
-KINDS = {
-    "metal": {"material": "Al", "energy_conserving": True},
-    "nested": {**GLASS, "nested": grey(0.5)},
-    "film": {"material": "Cu", "film_ior": 1.77, "film_thickness": 300.0},
-    "coat": {"material": "Al", "coat_ior": 1.58},
-    "transmission": {**GLASS, "plugin": "diffraction_dielectric"},
-    "thin": {**GLASS, "plugin": "diffraction_dielectric", "thin": True},
-    "surface": {"coherence": "surface", "uv_scale": 10.0},
-    "varying": {"height_scale": {"type": "checkerboard"}, "height_scale_max": 1.0},
-}
-
-
-def described(kind: str) -> dict[str, Any]:
-    if kind == "mix":
-        both = {one: described(one) for one in ("metal", "nested")}
-        return {"type": "diffraction_mix", "weight_metal": 0.3, **both}
-    found = diffraction(**KINDS[kind])
-    return {name: value for name, value in found.items() if value is not None}
 
 
 @pytest.fixture
@@ -72,10 +53,10 @@ def test_what_is_no_longer_used_is_let_go(name, without_gc):
     assert [one() for one in kept] == [None, None]
 
 
-@pytest.mark.parametrize("kind", [*KINDS, "mix"])
+@pytest.mark.parametrize("kind", [*KINDS, *THROUGH, MIX])
 def test_a_surface_of_any_kind_is_let_go(kind, some_variant, without_gc):
-    bsdf = mi.load_dict(described(kind))
-    surfaces = [bsdf] if kind != "mix" else [bsdf, *bsdf.bsdfs.values()]
+    bsdf = made(kind, energy_conserving=True)
+    surfaces = [bsdf] if kind != MIX else [bsdf, *bsdf.bsdfs.values()]
     kept = [weakref.ref(one) for one in surfaces]
     kept += [weakref.ref(one.table) for one in surfaces if hasattr(one, "table")]
     del bsdf, surfaces

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.support.directions import lit_pairs
-from tests.support.lanes import brdf_values
+from tests.support.directions import lit_pairs, polar
+from tests.support.furnace import furnace_in
+from tests.support.lanes import brdf_values, evaluated
 from tests.support.patches import SMALL_SCAN
 
 # a small scan is what is tested
@@ -43,8 +45,6 @@ def test_values_are_those_of_the_model(some_variant, parameters, reference):
     wi, wo, lam, near = pairs_of_the_mirror(60, 5)
     conserving = {"energy_conserving": False}
     bsdf = load(**(conserving | parameters))
-    if mi.is_rgb:
-        pytest.skip("colours are tested below")
     found = brdf_values(bsdf, wi, wo, lam[:, None])
     exact = md.reference.brdf(SMALL_SCAN, wi, wo, lam, **reference)
     factor = kirchhoff_factor(wi, wo, lam, 1.0)
@@ -52,3 +52,43 @@ def test_values_are_those_of_the_model(some_variant, parameters, reference):
     for part in (near, ~near):
         # the tolerance of the table; roughness as a table adds 1e-3 (`optics.blend`)
         assert difference[part].sum() < 2e-3 * scale[part].sum()
+
+
+@pytest.mark.thorough
+def test_colours_are_those_of_the_wavelengths():
+    mi.set_variant("llvm_ad_rgb")
+    bsdf = load(**MIRROR)
+    table = bsdf.table
+    lam = np.arange(376.0, 744.0, 0.5) + 0.25
+    weights = linear_srgb(response(lam))
+    weights /= weights.sum(axis=0)
+    for theta in (0.3, 1.0, 20.0):
+        wi, wo = polar(30.0, 180.0), polar(30.0 + theta, 0.0)
+        exact = table.brdf(np.tile(wi, (lam.size, 1)), wo, lam) @ weights * wo[2]
+        found = np.array(evaluated(bsdf, wi, wo, 550.0)).ravel()[:3]
+        # linear between 256 radii of the lobe, and eight digits of the sums
+        assert found == pytest.approx(exact, rel=0.02, abs=2e-3 * np.abs(exact).max())
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"material": "none"},
+        {"material": "Al"},
+        {"material": "Al", "coat_ior": 1.5},
+        {"plugin": "diffraction_dielectric", "int_ior": 1.5},
+        {"plugin": "diffraction_dielectric", "int_ior": 1.5, "thin": True},
+    ],
+    ids=lambda parameters: ", ".join(map(str, parameters.values())),
+)
+def test_no_more_light_leaves_than_arrives(parameters):
+    mi.set_variant("llvm_ad_mono")
+    directions = np.array([polar(theta, 30.0) for theta in (0.0, 30.0, 60.0, 75.0, 84.0, 88.0)])
+    mean, error = furnace_in(load(**parameters), directions, 1)
+    assert np.all(mean <= 1.0 + 4.0 * error + 2e-3), mean
+    # a window of another width moves light within lobes, far from the horizon
+    array = md.HeightField(SMALL_SCAN.heights, SMALL_SCAN.pixel_size)
+    one_window = mi.load_dict(md.bsdf_dict(array, coherence_width=4.8, **parameters))
+    others, _ = furnace_in(one_window, directions[:2], 1)
+    np.testing.assert_allclose(mean[:, :2], others, atol=0.02)

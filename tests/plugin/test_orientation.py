@@ -12,17 +12,8 @@ import pytest
 from mitsuba_diffraction.plugin.description import describe
 from mitsuba_diffraction.plugin.varying import PRECISION
 from tests.support.directions import polar
-from tests.support.gentle import UV, hits, load, pairs
-from tests.support.lanes import evaluated, interaction, refusal, spectra, vectors
-
-
-def bitmap(degrees, raw=True, channels=3, levels=None):
-    """Four directions; of an integer format, which clips, where it has so many `levels`."""
-    angles = np.deg2rad(np.reshape(degrees, (2, 2, 1)))
-    data = np.concatenate([np.cos(angles), np.sin(angles), 0 * angles], axis=2)[..., :channels]
-    if levels:
-        data = np.rint(np.clip(data, 0.0, 1.0) * levels) / levels
-    return {"type": "bitmap", "raw": raw, "data": mi.TensorXf(data.astype(np.float32))}
+from tests.support.gentle import directions, load, pairs
+from tests.support.lanes import evaluated, interaction, refusal
 
 
 @pytest.mark.parametrize(
@@ -35,7 +26,7 @@ def bitmap(degrees, raw=True, channels=3, levels=None):
     ],
 )
 def test_a_picture_that_holds_no_directions_is_refused(every_variant, texture, mend):
-    said = refusal(lambda: load(orientation=bitmap([10.0, 120.0, 200.0, 300.0], **texture)))
+    said = refusal(lambda: load(orientation=directions([10.0, 120.0, 200.0, 300.0], **texture)))
     assert said.startswith("orientation: ")
     assert re.search(mend, said)
 
@@ -44,7 +35,7 @@ def test_a_picture_that_holds_no_directions_is_refused(every_variant, texture, m
 def test_directions_that_integers_could_hold_are_taken(some_variant, degrees):
     """(0.6, 0.8) is a multiple of 1/255: no reason to refuse it."""
     wi, wo, lam = pairs(20)
-    textured = load(orientation=bitmap([degrees] * 4))
+    textured = load(orientation=directions([degrees] * 4))
     expected = evaluated(load(orientation=degrees), wi, wo, lam[:, None])
     found = evaluated(textured, wi, wo, lam[:, None])
     # the angle's sine in single precision, times kσ = 16
@@ -79,41 +70,8 @@ def test_angles_without_digits_are_refused(every_variant, degrees):
 
 
 @pytest.mark.thorough
-def test_a_texture_turns_each_point_its_own_way(some_variant):
-    angles = [0.0, 90.0, 200.0, 40.0]
-    wi, wo, lam = pairs()
-    bsdf = load(orientation=bitmap(angles))
-    for uv, degrees in zip(UV, angles, strict=True):
-        si = hits(wi, uv, lam[:, None])
-        here = spectra(bsdf.eval(mi.BSDFContext(), si, vectors(wo)))
-        constant = evaluated(load(orientation=degrees), wi, wo, lam[:, None])
-        assert here == pytest.approx(constant, rel=1e-3, abs=1e-5 * float(constant.max()))
-
-
-@pytest.mark.thorough
-def test_a_mesh_attribute_orients_the_patch(some_variant):
-    mesh = mi.Mesh("plate", 4, 2, has_vertex_texcoords=True)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0]
-    parameters["vertex_texcoords"] = [0, 0, 1, 0, 1, 1, 0, 1]
-    parameters["faces"] = [0, 1, 2, 0, 2, 3]
-    parameters.update()
-    mesh.add_attribute("vertex_direction", 3, [0.0, 1.0, 0.0] * 4)
-    scene = mi.load_dict({"type": "scene", "plate": mesh})
-    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0.6, 0.3, 1.0), mi.Vector3f(0.0, 0.0, -1.0)))
-    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
-    si.wi = mi.Vector3f(polar(30.0, 20.0))
-    wo = mi.Vector3f(polar(25.0, 230.0))
-    attribute = {"type": "mesh_attribute", "name": "vertex_direction"}
-    one, other = (
-        np.array(load(orientation=way).eval(mi.BSDFContext(), si, wo)) for way in (attribute, 90.0)
-    )
-    assert one == pytest.approx(other, rel=1e-3)
-
-
-@pytest.mark.thorough
 def test_textured_samples_are_drawn_as_densely_as_pdf_says(some_variant):
-    bsdf, n = load(orientation=bitmap([53.13010235] * 4)), 20000
+    bsdf, n = load(orientation=directions([53.13010235] * 4)), 20000
     si = interaction(np.tile(polar(30.0, 20.0), (n, 1)), [[400.0, 500.0, 600.0, 700.0]])
     rng = mi.PCG32(n)
     two = mi.Point2f(rng.next_float32(), rng.next_float32())

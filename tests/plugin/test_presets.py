@@ -41,7 +41,7 @@ def test_changes_replace_the_whole_material_of_a_look():
     assert changed["pigment"] == md.preset("snake")["pigment"]
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_rgb"])
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_spectral"])
 def test_the_plugin_is_the_bsdf_of_the_dictionary(variant):
     mi.set_variant(variant)
     xml = """<bsdf version="3.0.0" type="diffraction_preset" id="disc">

@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
 @pytest.mark.parametrize("name", ["cd", "gold-foil", "dichroic-film", "snake"])
 def test_a_look_is_mixed_and_coated_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
-    mi.set_variant("llvm_ad_rgb")
+    mi.set_variant("llvm_ad_mono")
     solved = kind_of(find_preset(name).patch) is FileKind.ORDERS
     own: dict[str, Any] = (
         {} if solved else {"filename": gentle_patch(tmp_path)["patch"], "pixel_size": 0.05}

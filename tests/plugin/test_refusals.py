@@ -40,6 +40,7 @@ REFUSED = [
     ({"tolerance": 0.0}, "tolerance=0 must be between 1e-6"),
     ({"tolerance": 2.0}, "tolerance=2 must be between 1e-6"),
     ({"tolerance": "fine"}, "tolerance='fine' must be between"),
+    ({"wavelength": 900.0}, "wavelength=900 nm is outside the table's 360 to 830"),
     ({"terms": 0}, "terms=0 must be a whole number from 1 to 400"),
     ({"terms": 8.5}, "terms=8.5 must be a whole number"),
     ({"terms": "eight"}, "terms='eight' must be a whole number"),

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.support.variants import evaluate, interaction
+from tests.support.lanes import interaction
+from tests.support.variants import evaluate
 
 #: Reflectances of mirrors that stand for three depths, µm, not in their order.
 DEPTHS = {"middle": (0.2, 0.8), "shallow": (0.1, 0.2), "deep": (0.4, 0.5)}

@@ -39,17 +39,6 @@ def relative(found, exact, light, near):
     return [difference[m].sum() / size[m].sum() for m in (near, ~near)]
 
 
-@pytest.mark.parametrize("basis", ["svd", "taylor"])
-def test_every_place_is_the_reference_s(variant, basis):
-    *light, near = lit_pairs(PATCH, sigma_of(WIDTH), 400, 2)
-    uv = places(400)
-    bsdf = load(**ON_SURFACE, basis=basis)
-    exact = md.reference.brdf(
-        PATCH, *light, coherence_width=WIDTH, coherence="surface", place=10.0 * uv
-    )
-    assert max(relative(values_at(bsdf, *light, uv), exact, light, near)) < 1e-3
-
-
 @pytest.mark.parametrize("taps", [None, 12])
 def test_places_follow_scale_orientation_and_the_side_that_v_runs_to(variant, taps, tmp_path):
     wi, wo, lam, near = lit_pairs(PATCH, sigma_of(WIDTH), 200, 3)

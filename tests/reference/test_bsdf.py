@@ -238,14 +238,12 @@ def mirror_albedo(theta: float, lam: float = 550.0, width: float = 65.0) -> floa
     return float(reference.brdf(FLAT, wi, wo, lam, coherence_width=width).sum() * step**2)
 
 
-@pytest.mark.parametrize("theta", [0.0, 30.0, 45.0, 60.0])
-def test_a_flat_mirror_s_albedo_is_one(theta):
+@pytest.mark.parametrize(
+    ("theta", "allowed"), [(0.0, 1e-3), (30.0, 1e-3), (45.0, 1e-3), (60.0, 1e-3), (75.0, 3e-3)]
+)
+def test_a_flat_mirror_s_albedo_is_one(theta, allowed):
     # what the window's own width changes, design section 7
-    assert mirror_albedo(theta) == pytest.approx(1.0, abs=1e-3)
-
-
-def test_a_flat_mirror_s_albedo_is_nearly_one_at_grazing_incidence():
-    assert mirror_albedo(75.0) == pytest.approx(1.0, abs=3e-3)  # likewise
+    assert mirror_albedo(theta) == pytest.approx(1.0, abs=allowed)
 
 
 @pytest.mark.parametrize("coherence", reference.COHERENCES)

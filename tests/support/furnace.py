@@ -14,26 +14,27 @@ AZIMUTHS = (0.0, 37.0, 90.0, 180.0)
 SAMPLES = 1 << 13
 
 
+def isotropic(pixels: int, pixel: float, cutoff: float) -> np.ndarray:
+    """Isotropic noise of RMS 1, (pixels, pixels), with waves up to about a frequency in 1/µm."""
+    frequency = np.hypot(*np.meshgrid(*2 * [np.fft.fftfreq(pixels, pixel)]))
+    noise = np.random.default_rng(4).standard_normal((pixels, pixels))
+    heights = np.fft.ifft2(np.fft.fft2(noise) * np.exp(-((frequency / cutoff) ** 2))).real
+    return heights / heights.std()
+
+
 def sinusoid() -> md.HeightField:
     """1.6 µm period, 0.3 µm deep: orders up to ±4, strong Rayleigh spikes."""
-    x = np.arange(64) * (1.6 / 64)
-    return md.HeightField(
-        np.tile(0.15 * np.cos(2 * np.pi * x / 1.6), (8, 1)), (0.025, 0.05), periodic=True
-    )
+    return md.gratings.sinusoidal(1.6, 0.3, periods=1, pixels_per_period=64, rows=16)
 
 
 def sawtooth() -> md.HeightField:
     """2.5 µm period, 0.25 µm deep."""
-    return md.HeightField(np.tile(np.arange(100) * 0.0025, (8, 1)), (0.025, 0.05), periodic=True)
+    return md.gratings.blazed(2.5, 0.25, periods=1, pixels_per_period=100, rows=16)
 
 
 def rough() -> md.HeightField:
-    """20 µm of isotropic noise, 60 nm rms, correlated over about 1.5 µm."""
-    rng = np.random.default_rng(4)
-    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(160, 0.125), np.fft.fftfreq(160, 0.125)))
-    spectrum = np.fft.fft2(rng.standard_normal((160, 160))) * np.exp(-((frequency / 0.3) ** 2))
-    heights = np.fft.ifft2(spectrum).real
-    return md.HeightField(0.06 * heights / heights.std(), 0.125)
+    """20 µm of noise, 60 nm rms, correlated over about 1.5 µm."""
+    return md.HeightField(0.06 * isotropic(160, 0.125, 0.3), 0.125)
 
 
 DIELECTRIC = {"material": None, "int_ior": 1.5}
@@ -107,21 +108,13 @@ def steep_sinusoid() -> md.HeightField:
 
 def noise(slope):
     """4.8 µm of isotropic noise of an RMS slope."""
-    rng, pixel = np.random.default_rng(4), 0.1
-    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(48, pixel), np.fft.fftfreq(48, pixel)))
-    spectrum = np.fft.fft2(rng.standard_normal((48, 48))) * np.exp(-((frequency / 0.9) ** 2))
-    heights = np.fft.ifft2(spectrum).real
-    steps = (np.roll(heights, -1, 1) - heights, np.roll(heights, -1, 0) - heights)
-    rms = np.sqrt(sum((step**2).mean() for step in steps)) / pixel
-    return md.HeightField(heights * (slope / rms), pixel, periodic=True)
+    heights, pixel = isotropic(48, 0.1, 0.9), 0.1
+    rms = np.sqrt(sum(((np.roll(heights, -1, axis) - heights) ** 2).mean() for axis in (0, 1)))
+    return md.HeightField(heights * (slope * pixel / rms), pixel, periodic=True)
 
 
-def shallow():
-    """1.6 µm period, 60 nm deep."""
-    wave = 0.03 * np.cos(2 * np.pi * np.arange(64) / 64)
-    return md.HeightField(np.tile(wave, (8, 1)), (0.025, 0.05), periodic=True)
-
-
+#: 1.6 µm period, 60 nm deep.
+_SHALLOW = md.gratings.sinusoidal(1.6, 0.06, periods=1, pixels_per_period=64, rows=16)
 _FLAT = md.HeightField(np.zeros((8, 8)), 0.5, periodic=True)
 _SHEET = {"plugin": "diffraction_dielectric", "thin": True, "ext_ior": 1.0, "coherence_width": 5.0}
 _METAL = {"material": "Al", "coherence_width": 4.8}
@@ -139,8 +132,8 @@ COMBINATIONS = [
             "lateral_scale": 0.1}),
     (_FLAT, _SHEET | {"thin": False, "int_ior": 1.5, "model": "kirchhoff",
                     "coherence_width": 1.2, "lateral_scale": 0.34, "wavelength": 624.0}),
-    (shallow(), {"material": "Al", "coat_ior": 1.58, "coherence_width": 12.8}),
-    (shallow(), {"material": "none", "coherence_width": 12.8}),
+    (_SHALLOW, {"material": "Al", "coat_ior": 1.58, "coherence_width": 12.8}),
+    (_SHALLOW, {"material": "none", "coherence_width": 12.8}),
     (noise(0.55), _METAL | {"coat_ior": 1.01}),
 ]  # fmt: skip
 

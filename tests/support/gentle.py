@@ -41,6 +41,15 @@ def bitmap(values: Array, **more: Any) -> dict[str, Any]:
     return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
 
 
+def directions(degrees, raw=True, channels=3, levels=None):
+    """Four directions; of an integer format, which clips, where it has so many `levels`."""
+    angles = np.deg2rad(np.reshape(degrees, (2, 2, 1)))
+    data = np.concatenate([np.cos(angles), np.sin(angles), 0 * angles], axis=2)[..., :channels]
+    if levels:
+        data = np.rint(np.clip(data, 0.0, 1.0) * levels) / levels
+    return {"type": "bitmap", "raw": raw, "data": mi.TensorXf(data.astype(np.float32))}
+
+
 def hits(wi: Array, uv: ArrayLike, wavelengths: ArrayLike = 550.0) -> Any:
     """Surface interactions at UV coordinates (2,) or (n, 2)."""
     si = interaction(wi, wavelengths)

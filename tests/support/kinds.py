@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -20,54 +20,79 @@ PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}}
 SCALES = np.full((2, 2, 1), 0.7, np.float32)
 PLANE = {"model": "kirchhoff"}
 SLOPE = {"model": "small_slope"}
+PLACED = {"coherence": "surface", "place": (0.0, 0.0)}
 
-Row = tuple[dict[str, Any], dict[str, Any] | None]
 
-#: Parameters of the plugin, and of the reference where it knows the kind.
-KINDS: dict[str, Row] = {
-    "mirror": ({"material": "none"}, {}),
-    "dielectric": (INDICES, SLOPE | {"eta": 1.5}),
-    "metal": (METAL, METAL | SLOPE),
-    "coat": (COATED[0], COATED[1] | SLOPE),
-    "film": (FILMED[0], FILMED[1] | SLOPE),
-    "pigment": (INDICES | {"pigment": PIGMENT}, None),
-    "height scales": ({"material": "none", "height_scale": {"type": "bitmap", "raw": True}}, None),
-    "surface": ({"material": "none", "coherence": "surface", "uv_scale": 10.0}, None),
+class Kind(NamedTuple):
+    """Parameters of the plugin, and of the reference where it knows the kind.
+
+    `stretch` and `height` are factors on the lengths and heights that the reference is given.
+    """
+
+    parameters: dict[str, Any]
+    reference: dict[str, Any] | None = None
+    stretch: float = 1.0
+    height: float = 1.0
+
+
+KINDS: dict[str, Kind] = {
+    "mirror": Kind({"material": "none"}, {}),
+    "dielectric": Kind(INDICES, SLOPE | {"eta": 1.5}),
+    "metal": Kind(METAL, METAL | SLOPE),
+    "coat": Kind(COATED[0], COATED[1] | SLOPE),
+    "film": Kind(FILMED[0], FILMED[1] | SLOPE),
+    "pigment": Kind(INDICES | {"pigment": PIGMENT}),
+    "height scales": Kind({"material": "none", "height_scale": {"type": "bitmap", "raw": True}}),
+    "surface": Kind({"material": "none", "coherence": "surface", "uv_scale": 10.0}, PLACED),
+    "narrower": Kind(INDICES | {"lateral_scale": 0.7}, SLOPE | {"eta": 1.5}, stretch=0.7),
 }
 #: Of `make test-all` alone.
-MORE: dict[str, Row] = {
-    "less dense": ({"int_ior": 1.0, "ext_ior": 1.4}, SLOPE | {"eta": 1.0 / 1.4}),
-    "nearly a dielectric": ({"eta": 1.56, "k": 1e-3}, SLOPE | {"eta": 1.56, "k": 1e-3}),
-    "coat on a dielectric": (
+MORE: dict[str, Kind] = {
+    "less dense": Kind({"int_ior": 1.0, "ext_ior": 1.4}, SLOPE | {"eta": 1.0 / 1.4}),
+    "nearly a dielectric": Kind({"eta": 1.56, "k": 1e-3}, SLOPE | {"eta": 1.56, "k": 1e-3}),
+    "coat on a dielectric": Kind(
         {"int_ior": 1.7, "ext_ior": 1.0, "coat_ior": 1.4}, SLOPE | {"eta": 1.7, "coat": 1.4},
     ),
-    "film on a dielectric": (
+    "film on a dielectric": Kind(
         INDICES | {"film_ior": 2.4, "film_k": 0.1, "film_thickness": 150.0},
         SLOPE | {"eta": 1.5, "film": (2.4 + 0.1j, 150.0)},
     ),
-    "one window": ({"material": "none", "coherence": "patch"}, {"coherence": "patch"}),
-    "turned, powers of the phase": (
-        {"material": "none", "basis": "taylor", "orientation": 25.0, "height_scale": 0.8}, None,
+    "one window": Kind({"material": "none", "coherence": "patch"}, {"coherence": "patch"}),
+    "turned, powers of the phase": Kind(
+        {"material": "none", "basis": "taylor", "orientation": 25.0, "height_scale": 0.8},
     ),
-    "in its own shade": (METAL | {"shadowing": "vcavity"}, None),
-    "dielectric, tangent plane": (INDICES | PLANE, PLANE | {"eta": 1.5}),
-    "metal, tangent plane": (METAL | PLANE, METAL | PLANE),
-    "coat, tangent plane": (COATED[0] | PLANE, COATED[1] | PLANE),
-    "film, tangent plane": (FILMED[0] | PLANE, FILMED[1] | PLANE),
+    "in its own shade": Kind(METAL | {"shadowing": "vcavity"}),
+    "dielectric, tangent plane": Kind(INDICES | PLANE, PLANE | {"eta": 1.5}),
+    "metal, tangent plane": Kind(METAL | PLANE, METAL | PLANE),
+    "coat, tangent plane": Kind(COATED[0] | PLANE, COATED[1] | PLANE),
+    "film, tangent plane": Kind(FILMED[0] | PLANE, FILMED[1] | PLANE),
+    "film, lower": Kind(FILMED[0] | {"height_scale": 0.5}, FILMED[1] | SLOPE, height=0.5),
+    "coat, narrower": Kind(COATED[0] | {"lateral_scale": 0.7}, COATED[1] | SLOPE, stretch=0.7),
+    "wider": Kind({"material": "none", "lateral_scale": 1.4}, {}, stretch=1.4),
+    "surface, narrower": Kind(
+        {"material": "none", "coherence": "surface", "uv_scale": 10.0, "lateral_scale": 0.7},
+        PLACED, stretch=0.7,
+    ),
 }  # fmt: skip
 
 #: Light that goes through.
-THROUGH = {f"through a {name}": parameters for name, parameters in SIDES.items()}
+THROUGH: dict[str, dict[str, Any]] = {
+    **{f"through a {name}": parameters for name, parameters in SIDES.items()},
+    "through a narrower dielectric": {"lateral_scale": 0.7},
+}
+#: Mixes of two equal parts; the sheets of `make test-all` alone.
+MIX, MIXED_SHEETS = "blended patches", "through blended sheets"
 
 
-def made(kind: str, field: md.HeightField = PATCH) -> Any:
+def made(kind: str, field: md.HeightField = PATCH, **more: Any) -> Any:
     """The BSDF of a kind that reflects or transmits, or a mix, in the variant that is set."""
-    if kind == "blended patches":
-        one = md.bsdf_dict(field, coherence_width=WIDTH, material="none", energy_conserving=False)
-        return mi.load_dict({"type": "diffraction_mix", "one": one, "two": one, "weight_one": 0.3})
+    if kind in (MIX, MIXED_SHEETS):
+        part = "mirror" if kind == MIX else "through a sheet"
+        one, two = (made(part, field, **more) for _ in range(2))
+        return mi.load_dict({"type": "diffraction_mix", "one": one, "two": two, "weight_one": 0.3})
     if kind in THROUGH:
-        return both(field, wavelength=600.0, **THROUGH[kind])
-    parameters = dict((KINDS | MORE)[kind][0])
+        return both(field, wavelength=600.0, **THROUGH[kind], **more)
+    parameters = (KINDS | MORE)[kind].parameters | more
     if kind == "height scales":
         parameters["height_scale"] = parameters["height_scale"] | {"data": mi.TensorXf(SCALES)}
     return load(field, wavelength=600.0, **parameters)
@@ -78,18 +103,24 @@ def exact(kind: str, wi: Array, wo: Array, wavelengths: Array) -> Array | None:
 
     Radiance of what goes through is that of equal media on both sides.
     """
+    kind = {MIX: "mirror", MIXED_SHEETS: "through a sheet"}.get(kind, kind)
+    stretch, height, function = 1.0, 1.0, reference.brdf
     if kind in THROUGH:
-        own, function = SLOPE | {"eta": 1.5} | THROUGH[kind], reference.btdf
+        own = SLOPE | {"eta": 1.5} | THROUGH[kind]
+        stretch, function = own.pop("lateral_scale", 1.0), reference.btdf
     else:
-        found = (KINDS | MORE)[kind][1]
-        if found is None:
+        _, known, stretch, height = (KINDS | MORE)[kind]
+        if known is None:
             return None
-        own, function = found, reference.brdf
-    columns = [function(PATCH, wi, wo, one, coherence_width=WIDTH, **own) for one in wavelengths.T]
+        own = known
+    patch = md.HeightField(height * PATCH.heights, PATCH.pixel_size).stretched(stretch)
+    # stretched heights keep the table's window, which the light's limits
+    own = {"coherence_width": WIDTH * min(stretch, 1.0)} | own
+    columns = [function(patch, wi, wo, one, **own) for one in wavelengths.T]
     return np.stack(columns, axis=1) * np.abs(wo[:, 2:])
 
 
 def lit(kind: str, count: int) -> tuple[Array, Array, Array]:
     """Directions of light and eye, to where the kind sends light, and wavelengths (count, 4)."""
     wi, wo, lam = (part[:count] for part in pairs())
-    return wi, as_single(wo * BELOW) if kind in THROUGH else wo, lam
+    return wi, as_single(wo * BELOW) if kind.startswith("through") else wo, lam

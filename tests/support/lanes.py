@@ -24,20 +24,27 @@ def lanes(values: ArrayLike) -> Any:
 
 
 def vectors(directions: ArrayLike) -> Any:
-    """mi.Vector3f of directions (n, 3)."""
-    return mi.Vector3f(*map(lanes, np.atleast_2d(np.asarray(directions, np.float32)).T))
+    """mi.Vector3f of directions (n, 3), in scalar variants of one."""
+    rows = np.atleast_2d(np.asarray(directions, np.float32))
+    if not dr.is_jit_v(mi.Float):
+        return mi.Vector3f(*rows[0].tolist())
+    return mi.Vector3f(*map(lanes, rows.T))
 
 
 def interaction(wi: ArrayLike, wavelengths: ArrayLike) -> Any:
-    """Surface interactions in a frame of their own, for wi (n, 3) and nm: (n, 4), (n,) or one."""
-    directions = np.atleast_2d(np.asarray(wi, np.float32))
-    n = len(directions)
+    """Surface interactions in a frame of their own, for wi (n, 3) and nm: (n, 4), (n,) or one.
+
+    Scalar variants have one, for wi (3,) and nm: (4,) or one.
+    """
+    n = len(np.atleast_2d(wi))
     si = dr.zeros(mi.SurfaceInteraction3f, n)
-    si.wi = vectors(directions)
+    si.wi = vectors(wi)
     lam = np.asarray(wavelengths, np.float32)
-    lam = np.broadcast_to(lam if lam.ndim == 2 else lam.reshape(-1, 1), (n, 4))
-    if mi.is_spectral:
-        si.wavelengths = mi.Spectrum(*map(lanes, lam.T))
+    if mi.is_spectral and not dr.is_jit_v(mi.Float):
+        si.wavelengths = mi.UnpolarizedSpectrum(*np.broadcast_to(lam.ravel(), 4).tolist())
+    elif mi.is_spectral:
+        lam = np.broadcast_to(lam if lam.ndim == 2 else lam.reshape(-1, 1), (n, 4))
+        si.wavelengths = mi.UnpolarizedSpectrum(*map(lanes, lam.T))
     si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
     return si
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mitsuba_diffraction import HeightField, reference
@@ -18,11 +20,12 @@ DEFAULTS = {"coherence_width": WIDTH}
 SMALL_SCAN = HeightField(PATCH.heights, PATCH.pixel_size, name="small scan", cut_out=True)
 
 
-def relative_error(table, field, n=400, seed=1):
-    """Σ|table − reference| / Σ reference of ⟨|P|²⟩, near order 0 and elsewhere."""
-    wi, wo, lam, near = lit_pairs(field, table.sigma, n, seed)
+def relative_error(table, *fields, n=400, height_scale=1.0):
+    """Σ|table − mean of references| / Σ mean of ⟨|P|²⟩, near order 0 and elsewhere."""
+    fields = [replace(field, heights=height_scale * field.heights) for field in fields]
+    wi, wo, lam, near = lit_pairs(fields[0], table.sigma, n, 1)
     factor = kirchhoff_factor(wi, wo, lam, table.sigma)
-    width = table.coherence_width
-    exact = reference.brdf(field, wi, wo, lam, coherence_width=width, coherence=table.coherence)
-    difference = np.abs(table.brdf(wi, wo, lam) - exact) / factor
+    given = {"coherence_width": table.coherence_width, "coherence": table.coherence}
+    exact = np.mean([reference.brdf(field, wi, wo, lam, **given) for field in fields], axis=0)
+    difference = np.abs(table.brdf(wi, wo, lam, height_scale=height_scale) - exact) / factor
     return [difference[m].sum() / (exact / factor)[m].sum() for m in (near, ~near)]

@@ -124,10 +124,10 @@ def scene(bsdf: dict[str, Any]) -> Any:
     )
 
 
-def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64) -> None:
+def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64, within: float = 0.05) -> None:
     """Compare derivatives, forward and backward, with differences of the same random numbers.
 
-    All texels of a bitmap move alike.
+    All texels of a bitmap move alike. `within` is the relative difference that is allowed.
     """
     # look-ups of colours bend between their bins: their kinks average out
     spp = 4 * spp if mi.is_rgb else spp
@@ -174,7 +174,7 @@ def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64) -> None:
         noise = 1e-6 * ends[0].sum() / step
         # pixels that brighten and those that darken do not cancel
         along = float(np.sum(forward[name] * np.sign(difference)))
-        assert along == pytest.approx(np.abs(difference).sum(), rel=0.05, abs=noise), name
+        assert along == pytest.approx(np.abs(difference).sum(), rel=within, abs=noise), name
 
 
 def plate(name: str, width: float, **more: Any) -> dict[str, Any]:

@@ -1,17 +1,49 @@
-"""Files of tables, read without the package."""
+"""Files of tables, read and changed without the package."""
 
 from __future__ import annotations
 
 import json
 import os
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import OpenEXR
 
 from mitsuba_diffraction.files import TABLE_ATTRIBUTE
+from mitsuba_diffraction.tables.exr import CHECKSUM, _checksum
 
 
 def document_in(path: str | os.PathLike[str]) -> dict[str, Any]:
     """The JSON attribute of a table's file."""
     with OpenEXR.File(str(path), header_only=True) as file:
         return json.loads(file.header()[TABLE_ATTRIBUTE])
+
+
+class Contents:
+    """What is in a table's file, to be changed and written with a checksum that fits."""
+
+    def __init__(self, path: Path) -> None:
+        with OpenEXR.File(str(path), separate_channels=True) as exr:
+            self.channels = {name: np.array(c.pixels) for name, c in exr.channels().items()}
+            self.document = json.loads(exr.header()[TABLE_ATTRIBUTE])
+
+    def write(self, path: Path) -> None:
+        """A file that nothing but what it says gives away."""
+        text = json.dumps(self.document)
+        rows, columns = next(iter(self.channels.values())).shape
+        # the order in which a reader goes through the channels
+        ordered = {name: self.channels[name] for name in sorted(self.channels, key=_place)}
+        header = {
+            "type": OpenEXR.scanlineimage,
+            "compression": OpenEXR.ZIP_COMPRESSION,
+            "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
+            TABLE_ATTRIBUTE: text,
+            CHECKSUM: _checksum(text, ordered),
+        }
+        OpenEXR.File(header, self.channels).write(str(path))
+
+
+def _place(channel: str) -> tuple[int, bool, int]:
+    prefix, interval, term = channel.split(".")
+    return int(interval), prefix == "im", int(term)

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from tests.support.directions import Array
+from tests.support.lanes import interaction, vectors
 
 #: The variants that the plugin supports; the second needs a GPU.
 VARIANTS = ("llvm_ad_spectral", "cuda_ad_spectral")
@@ -43,16 +44,6 @@ def runs(name: str) -> bool:
     return name.startswith("scalar") or bool(dr.has_backend(dr.JitBackend.LLVM))
 
 
-def interaction(wi: Array, wavelengths: Array) -> Any:
-    """At one direction (3,) in scalar variants, at (n, 3) of them elsewhere."""
-    si = dr.zeros(mi.SurfaceInteraction3f, 1 if wi.ndim == 1 else len(wi))
-    si.wi = mi.Vector3f(*wi.T.tolist()) if wi.ndim == 1 else mi.Vector3f(wi.T)
-    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
-    if mi.is_spectral:
-        si.wavelengths = mi.UnpolarizedSpectrum(wavelengths.T)
-    return si
-
-
 def evaluate(
     bsdf: Any,
     wi: Array,
@@ -80,13 +71,12 @@ def evaluate(
         return [np.array(part, float).T for part in parts]
 
     if dr.is_jit_v(mi.Float):
-        si = interaction(wi, wavelengths)
         two = mi.Point2f(samples[:, 1:].T)
-        return once(si, mi.Vector3f(wo.T), mi.Float(samples[:, 0]), two)
+        return once(interaction(wi, wavelengths), vectors(wo), mi.Float(samples[:, 0]), two)
     rows = [
         once(
             interaction(wi[n], wavelengths[n]),
-            mi.Vector3f(wo[n].tolist()),
+            vectors(wo[n]),
             float(samples[n, 0]),
             mi.Point2f(samples[n, 1:].tolist()),
         )

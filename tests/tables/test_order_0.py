@@ -7,13 +7,30 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.heights.coherence import LOOKUP
+from mitsuba_diffraction.heights.read import LoadOptions, treated_by_default
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.support.directions import lit_pairs
-from tests.support.mirror import FAST, beside_the_mirror
+from tests.support.directions import lit_pairs, polar
 from tests.support.patches import SMALL_SCAN, relative_error
 
 # small and coarse scans are what is tested
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+
+LAMP = polar(30.0, 180.0)
+#: Settings of tables that are quick to build.
+FAST = {"height_scale_max": 1.0, "wavelength_range": (440.0, 810.0)}
+
+
+def beside_the_mirror(table, degrees, wavelengths):
+    """Reflectance over that of white for a detector of 2° beside the mirror direction."""
+    n = np.arange(600)
+    radius, turn = np.radians(1.0) * np.sqrt((n + 0.5) / n.size), 2.399963 * n  # even over the disc
+    sin, cos = np.sin(np.radians(30.0 + degrees)), np.cos(np.radians(30.0 + degrees))
+    axes = np.array([[cos, 0.0, -sin], [0.0, 1.0, 0.0]])
+    wo = np.array([sin, 0.0, cos]) * np.cos(radius)[:, None]
+    wo += (np.stack([np.cos(turn), np.sin(turn)], axis=1) * np.sin(radius)[:, None]) @ axes
+    each = [(table.brdf(LAMP, wo, lam) * wo[:, 2]).mean() for lam in wavelengths]
+    return np.pi * np.array(each) / cos
 
 
 @pytest.mark.parametrize("width", [1.0, 2.0, 5.0, 10.0, 30.0, 65.0])
@@ -57,13 +74,40 @@ def test_tables_of_a_small_scan_meet_their_tolerance(basis):
     assert difference[close].sum() < table.tolerance * scale[close].sum()
 
 
-def test_files_hold_the_window_of_a_scan_and_older_ones_have_one_window(tmp_path):
-    scan = md.DiffractionTable.build(SMALL_SCAN)
-    scan.save(tmp_path / "scan.exr")
-    loaded = md.DiffractionTable.load(tmp_path / "scan.exr")
-    assert (loaded.sigma, loaded.sigma_0) == (scan.sigma, scan.sigma_0)
-    assert loaded.digest() == scan.digest()
-    whole = SMALL_SCAN.treated(periodic="exact")
-    table = md.DiffractionTable.build(whole, coherence_width=4.5)
-    assert "window_width" not in table.settings.as_json()
-    assert table.sigma == table.sigma_0
+def rough_ridges(n, pixel):
+    """Ridges 1.25 µm apart that waver, and roughness of all lengths: (n, n) heights in µm."""
+    rng = np.random.default_rng(1)
+    f = np.hypot(*np.meshgrid(np.fft.fftfreq(n, pixel), np.fft.fftfreq(n, pixel)))
+
+    def noise(amplitude):
+        field = np.fft.ifft2(np.fft.fft2(rng.standard_normal((n, n))) * amplitude).real
+        return field / field.std()
+
+    roughness = noise(np.exp(-((f / 2.5) ** 2)) / (f + 0.1))
+    wavering = noise(np.exp(-((5.0 * f) ** 2)))
+    x = np.arange(n) * pixel
+    return 0.015 * roughness + 0.03 * np.sin(2 * np.pi * x / 1.25 + 0.7 * wavering)
+
+
+@pytest.mark.thorough
+def test_crops_of_a_rough_surface_have_the_light_of_the_whole():
+    """Six crops of 10 µm, as files of them are treated by default, against the whole 266 µm."""
+    pixel, n, side = 0.25, 1064, 40
+    heights, rng = rough_ridges(n, pixel), np.random.default_rng(5)
+    limit = {"tolerance": 1e-2, "frequency_limit": (6.0, 1.5), **FAST}
+    whole = md.DiffractionTable.build(md.HeightField(heights, pixel, periodic=True), **limit)
+    crops = []
+    for _ in range(6):
+        y, x = rng.integers(0, n - side, 2)
+        part = md.HeightField(heights[y : y + side, x : x + side], pixel, cut_out=True)
+        treated = treated_by_default(part, LoadOptions())
+        crops.append(md.DiffractionTable.build(treated, **limit))
+    wavelengths = np.arange(450.0, 801.0, 50.0)
+    for degrees in (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0):
+        truth = beside_the_mirror(whole, degrees, wavelengths)
+        found = np.mean([beside_the_mirror(crop, degrees, wavelengths) for crop in crops], axis=0)
+        # the window of a crop blurs frequencies nearer to 0 than twice that of the longest wave
+        # in it: there some light is missing, and no more is added
+        assert np.all(found < 2.0 * truth), (degrees, found / truth)
+        seen = np.sin(np.radians(degrees)) / wavelengths > 2e-3 / (side * pixel)
+        assert np.all(found[seen] > 0.5 * truth[seen]), (degrees, found / truth)

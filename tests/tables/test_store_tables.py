@@ -46,42 +46,17 @@ class Builder:
         return source.cached_table(self.heights.digest(), settings, self, names)
 
 
-def test_a_table_is_built_once_and_shared_while_in_use():
-    build = Builder()
-    first, second = build.table(), build.table()
-    assert build.built == 1
-    assert first is second
-
-
-def test_a_later_process_reads_it_from_disk(folder):
-    build = Builder()
-    first = build.table()
-    (file,) = folder.iterdir()
-    assert file.suffix == ".cache"
-    source._tables.clear()  # as in a process of its own
-    second = build.table()
-    assert build.built == 1
-    assert second is not first
-    assert np.array_equal(first.coefficients, second.coefficients)
-
-
-def test_the_cache_keeps_no_name_of_a_file(folder):
-    """Whoever has equal heights under another name is told their own."""
-    Builder(dataclasses.replace(PATCH, name="secret.npy")).table()
+def test_a_later_process_reads_it_from_disk_under_its_own_name(folder):
+    """The cache keeps no name of a file: whoever has equal heights is told their own."""
+    first = Builder(dataclasses.replace(PATCH, name="secret.npy")).table()
     (file,) = folder.iterdir()
     assert b"secret" not in file.read_bytes()
-    source._tables.clear()
+    source._tables.clear()  # as in a process of its own
     build = Builder(dataclasses.replace(PATCH, name="copy.npy"))
-    assert build.table().source["name"] == "copy.npy"
+    second = build.table()
+    assert second.source["name"] == "copy.npy"
     assert build.built == 0
-
-
-def test_equal_content_is_found_whatever_it_is_called():
-    build = Builder()
-    build.table()
-    again = Builder(HeightField(PATCH.heights.copy(), PATCH.pixel_size, name="another name"))
-    again.table()
-    assert again.built == 0
+    assert np.array_equal(first.coefficients, second.coefficients)
 
 
 @pytest.mark.parametrize(
@@ -148,18 +123,13 @@ def test_the_oldest_tables_go_when_the_folder_is_full(folder, monkeypatch):
     assert len(left) == 3
 
 
-def test_the_newest_table_stays_however_large(folder, monkeypatch):
-    monkeypatch.setattr(store, "MAX_BYTES", 1)
-    Builder().table()
-    Builder(coherence_width=1.7).table()
-    assert len(list(folder.iterdir())) == 1
-
-
-def test_other_files_in_the_folder_are_left_alone(folder, monkeypatch):
+def test_the_newest_table_stays_however_large_and_other_files_are_left_alone(folder, monkeypatch):
     folder.mkdir()
     (folder / "notes.txt").write_text("mine")
     monkeypatch.setattr(store, "MAX_BYTES", 1)
     Builder().table()
+    Builder(coherence_width=1.7).table()
+    assert len(list(folder.iterdir())) == 2
     assert (folder / "notes.txt").read_text() == "mine"
 
 

@@ -7,9 +7,8 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, reference
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.support.directions import lit_pairs, rough_patch
-from tests.support.patches import DEEP, DEFAULTS, PATCH, WIDTH, relative_error
+from tests.support.directions import rough_patch
+from tests.support.patches import DEEP, DEFAULTS, PATCH, relative_error
 
 pytestmark = pytest.mark.thorough
 
@@ -50,32 +49,19 @@ def test_a_flat_patch_is_a_mirror_at_every_kappa():
         assert one_sigma == pytest.approx(np.exp(-1.0), abs=1e-6)
 
 
-def test_more_heights_than_one_patch_are_averaged():
-    others = [rough_patch((64, 63), (0.08, 0.075), 0.25, seed=n) for n in (2, 3)]
-    patches = [PATCH, *others]
+FINE = rough_patch((96, 96), (0.05, 0.05), 0.3)
+SEVERAL = {
+    "others": [PATCH, *(rough_patch((64, 63), (0.08, 0.075), 0.25, seed=n) for n in (2, 3))],
+    "other pixels": [HeightField(FINE.heights[::2, ::2], 0.1), FINE],
+}
+
+
+@pytest.mark.parametrize("patches", SEVERAL.values(), ids=SEVERAL)
+def test_more_heights_than_one_patch_are_averaged(patches):
     table = DiffractionTable.build(patches, tolerance=1e-4, **DEFAULTS)
-    wi, wo, lam, _ = lit_pairs(PATCH, table.sigma, 200, seed=2)
-    exact = np.mean(
-        [reference.brdf(p, wi, wo, lam, coherence_width=WIDTH) for p in patches], axis=0
-    )
-    factor = kirchhoff_factor(wi, wo, lam, table.sigma)
-    error = np.sum(np.abs(table.brdf(wi, wo, lam) - exact) / factor) / np.sum(exact / factor)
-    assert error <= 1e-4
+    assert max(relative_error(table, *patches)) <= 1e-4
     assert [p["digest"] for p in table.source["patches"]] == [p.digest() for p in patches]
     assert 0.0 < table.source["variation"] < 2.0  # std over mean of speckle is near 1
-
-
-def test_patches_of_other_pixels_but_one_size_are_averaged():
-    fine = rough_patch((96, 96), (0.05, 0.05), 0.3)
-    coarse = HeightField(fine.heights[::2, ::2], 0.1)
-    table = DiffractionTable.build([fine, coarse], coherence_width=4.8, tolerance=1e-4)
-    wi, wo, lam, _ = lit_pairs(coarse, table.sigma, 100, seed=2)
-    exact = np.mean(
-        [reference.brdf(p, wi, wo, lam, coherence_width=4.8) for p in (fine, coarse)], axis=0
-    )
-    factor = kirchhoff_factor(wi, wo, lam, table.sigma)
-    error = np.sum(np.abs(table.brdf(wi, wo, lam) - exact) / factor) / np.sum(exact / factor)
-    assert error <= 1e-4
 
 
 @pytest.mark.parametrize("coherence", reference.COHERENCES)
@@ -95,7 +81,7 @@ def _fine(field, coherence):
 
 
 @pytest.mark.parametrize("coherence", reference.COHERENCES)
-@pytest.mark.parametrize("depth", [0.05, 0.25, 1.2])
+@pytest.mark.parametrize("depth", [0.05, 1.2])
 def test_the_svd_takes_no_more_memory_than_polynomials(depth, coherence):
     field = HeightField(PATCH.heights * (depth / PATCH.range), PATCH.pixel_size)
     ours, polynomials = (

@@ -86,11 +86,3 @@ def test_a_limit_beyond_what_light_can_probe_is_none(whole):
     table = DiffractionTable.build(PATCH, coherence_width=WIDTH, frequency_limit=1e3)
     assert not table.limited
     assert table.digest() == whole.digest()
-
-
-def test_a_file_keeps_the_limit(limited, tmp_path):
-    file = tmp_path / "table.exr"
-    limited.save(file)
-    loaded = DiffractionTable.load(file)
-    assert loaded.frequency_limit == LIMIT
-    assert loaded.digest() == limited.digest()

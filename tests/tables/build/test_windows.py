@@ -221,15 +221,6 @@ def test_a_tile_that_is_too_wide_is_told_of_windows(scan):
         DiffractionTable.build(tile, **{**SETTINGS, "coherence_width": 1.2, "tolerance": 1e-4})
 
 
-def test_a_saved_table_keeps_its_windows(table, tmp_path):
-    table.save(tmp_path / "table.exr")
-    again = DiffractionTable.load(tmp_path / "table.exr")
-    assert again.settings == table.settings
-    assert again.sigma == table.sigma
-    assert again.source["windows"]["standard_error"] == table.source["windows"]["standard_error"]
-    assert again.digest() == table.digest()
-
-
 def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
     heights = rough(300).astype(np.float32)
     np.save(tmp_path / "scan.npy", heights)
