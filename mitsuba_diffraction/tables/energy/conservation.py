@@ -144,7 +144,7 @@ class SurfaceEnergy:
         # waves are closer than orders need where a film has fringes
         places = settings.between[few and fringes <= count and not self._both_sides]
         for place in places if len(nodes) > 1 else (0.0,):
-            self._lower_between(nodes, place, parts, s)
+            self._lower_between(nodes, place, parts, settings.calm[few], s)
 
         if np.all(s == 1.0):
             return Conservation(albedo)
@@ -209,10 +209,10 @@ class SurfaceEnergy:
         largest = np.interp(np.degrees(self._grid.theta), (70.0, 80.0), (settings.largest, end))
         return scaled(light.sums, aim, largest[:, None], settings.sweeps)
 
-    def _lower_between(self, nodes: Real, place: float, parts: int, s: Array) -> None:
+    def _lower_between(self, nodes: Real, place: float, parts: int, calm: float, s: Array) -> None:
         """Lower s for light at a place between all neighbouring wavelengths.
 
-        Few directions tell first between which ones light may exceed the ceiling.
+        calm : see `EnergySettings`; 0 for a close look at all light.
         """
         between = nodes[:-1] ** (1.0 - place) * nodes[1:] ** place if len(nodes) > 1 else nodes
         few = self._lights(between, *self._grid.half.middles(1))
@@ -222,7 +222,7 @@ class SurfaceEnergy:
 
         def lower(n: int) -> None:
             pair = slice(n, n + 2)
-            if few[n]().sent(weighted(s[pair], shares)).max() <= self._settings.calm:
+            if calm and few[n]().sent(weighted(s[pair], shares)).max() <= calm:
                 return
             light = lights[n]()
             s[pair] = lowered(s[pair], shares, lambda s: light.sent(s) / ceiling, passes)
