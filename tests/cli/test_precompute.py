@@ -12,7 +12,6 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.cli.console import Bar
 from tests.support.room import SCENE
-from tests.support.systems import posix
 
 # A table of 6 µm heights with these takes a tenth of a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6"]
@@ -162,13 +161,6 @@ def test_several_files_make_one_table_of_their_mean_power(run, heights, here):
     assert "between patches" in ran.out
     patches = DiffractionTable.load("mean.exr").source["patches"]
     assert [patch["name"] for patch in patches] == ["grating.npy", "other.npy"]
-
-
-@posix
-def test_a_full_disk_is_one_line_and_leaves_nothing(child, heights, tmp_path):
-    ran = child(["precompute", heights, *QUICK, "-o", "out.exr"], limit=500)
-    assert "cannot write 'out.exr'" in ran.failed_in_one_line()
-    assert os.listdir(tmp_path) == ["in"]
 
 
 @pytest.mark.parametrize(
