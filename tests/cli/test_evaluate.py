@@ -101,11 +101,3 @@ def test_a_given_period_is_compared_with(run, heights):
     ran = run("evaluate", heights, *EXACT, *QUICK, "--period", "3", "-o", "a.png")
     assert ran.code == 0, ran.err
     assert "given     3000 nm, the ridge is within 0." in ran.out
-
-
-def test_a_patch_without_period_is_refused_by_methods_that_need_one(run, tmp_path):
-    noise = np.random.default_rng(1).normal(0.0, 0.02, (64, 64))
-    np.save(tmp_path / "noise.npy", noise)
-    line = run("evaluate", tmp_path / "noise.npy", *QUICK, "--method", "nmm").failed_in_one_line()
-    assert "needs a period" in line
-    assert "confidence" in line

@@ -70,14 +70,6 @@ def test_a_recipe_is_described(run, heights):
     assert data["patches"][0]["shape"] == [75, 75]
 
 
-@pytest.mark.parametrize("content", [None, b"", b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n", b"ab"])
-def test_files_that_are_nothing_are_one_line(run, tmp_path, content):
-    file = tmp_path / "what.exr"
-    if content is not None:
-        file.write_bytes(content)
-    assert str(file) in run("info", file).failed_in_one_line()
-
-
 def test_a_damaged_table_is_one_line(run, table, capfd):
     content = table.read_bytes()
     for damaged in (content[:-1000], content[:-100] + bytes(100), content[:-1000] + bytes(1000)):
@@ -101,12 +93,6 @@ def test_an_exr_that_is_no_table_is_heights(run, tmp_path):
     file = tmp_path / "heights.exr"
     OpenEXR.File({}, {"Y": np.zeros((4, 4), np.float32)}).write(str(file))
     assert "height field" in run("info", file, "--pixel-size", "1").out
-
-
-def test_options_for_heights_do_not_fit_a_table(run, table):
-    ran = run("info", table, "--pixel-size", "0.08")
-    assert ran.code == 2
-    assert "--pixel-size" in ran.err
 
 
 MESH = """ply
@@ -139,25 +125,6 @@ def test_a_mesh_is_judged_by_its_tangents(run, tmp_path, has_uv):
     assert data["usable"] is has_uv
 
 
-@pytest.mark.parametrize("content", [b"", b"ply", b"no mesh at all"])
-def test_a_file_that_is_no_mesh_is_one_line(run, tmp_path, content):
-    file = tmp_path / "a.ply"
-    file.write_bytes(content)
-    assert str(file) in run("info", file).failed_in_one_line()
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("a.stl", "convert it to PLY or OBJ"),
-        ("a.xml", "is a scene, which `mitsuba-diffraction render` renders; info describes"),
-    ],
-)
-def test_files_of_other_kinds_are_answered_with_what_to_do(run, tmp_path, name, said):
-    (tmp_path / name).write_bytes(b"solid")
-    assert said in run("info", tmp_path / name).failed_in_one_line()
-
-
 def test_the_albedo_is_plotted(run, table, tmp_path):
     picture = tmp_path / "albedo.png"
     ran = run("info", table, "--albedo", picture)
@@ -177,26 +144,12 @@ def test_heights_are_drawn(run, heights, tmp_path, depth):
         assert image.width > 3 * image.height  # a row of panels
 
 
-def test_a_recipe_is_drawn_and_a_table_is_not(run, table, tmp_path):
+def test_a_recipe_is_drawn(run, tmp_path):
     recipe = tmp_path / "grating.toml"
     text = 'generator = "sinusoidal"\n[arguments]\nperiod = 1.6\ndepth = 0.05\nperiods = 3\n'
     recipe.write_text(text)
     assert run("info", recipe, "--picture", tmp_path / "recipe.pdf").code == 0
     assert (tmp_path / "recipe.pdf").stat().st_size > 1000
-    for option in (
-        ("--picture", tmp_path / "table.png"),
-        ("--coherence-width", "5"),
-        ("--wavelength-range", "400:700"),
-    ):
-        ran = run("info", table, *option)
-        assert ran.code == 2
-        assert "is a table, not heights" in ran.err
-
-
-def test_only_a_table_has_an_albedo(run, heights, tmp_path):
-    ran = run("info", heights, "--pixel-size", "0.08", "--albedo", tmp_path / "albedo.png")
-    assert ran.code == 2
-    assert "not a table" in ran.err
 
 
 def test_a_patch_too_wide_for_its_window_is_mentioned(run, tmp_path):
@@ -242,17 +195,10 @@ def test_normals_are_those_of_the_file(run, tmp_path, kind, own):
     assert (data["normals"] == "in the file") is own
 
 
-def test_formats_are_listed_with_what_to_export_for_others(run, tmp_path):
+def test_formats_are_listed_with_what_to_export_for_others(run):
     ran = run("info", "--formats")
     assert ran.code == 0
     assert "NanoScope (.spm" in ran.out
     data = json.loads(run("info", "--formats", "--json").out)
     for row in data["not read"]:
         assert row["instead"]
-    (tmp_path / "a.sxm").write_bytes(b":NANONIS_VERSION:\n2\n")
-    said = run("info", tmp_path / "a.sxm").failed_in_one_line()
-    assert "Nanonis" in said
-    assert "Gwyddion" in said
-    assert "--formats" in run("info").err
-    assert "argument FILE with --formats" in run("info", "a.png", "--formats").err
-    assert "--level" in run("info", "--formats", "--level", "plane").err

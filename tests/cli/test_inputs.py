@@ -174,16 +174,3 @@ def test_a_whole_number_of_many_digits_in_toml_is_refused_in_one_line(run, here,
     *notes, line = ran.err.splitlines()
     assert all("note" in note or ", after " in note for note in notes)
     assert "a.toml' is not TOML" in line
-
-
-def test_layers_of_a_solution_that_are_no_toml_are_a_usage_error_that_says_so(run, here):
-    Path("a.toml").write_text(f"repeat = {5000 * '9'}\n")
-    ran = run("solve", "lamellar", "--period", 1, "--depth", 0.1, "--layer", "a.toml")
-    assert ran.code == 2
-    assert "argument --layer: 'a.toml' is not TOML" in ran.err
-
-
-@pytest.mark.parametrize("crop", ["1e308", "1e308,1", "1,1e308"])
-def test_a_crop_wider_than_numbers_go_is_refused_in_one_line(run, heights, here, crop):
-    line = run("info", heights, "--pixel-size", "0.08", "--crop", crop).failed_in_one_line()
-    assert "larger than the patch" in line

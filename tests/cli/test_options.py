@@ -57,9 +57,3 @@ def test_options_are_refused_by_their_own_names(parser, capsys):
     with pytest.raises(SystemExit):
         refuse(args, names, ": not here")
     assert "error: argument --layer: not here" in capsys.readouterr().err
-
-
-def test_a_zero_on_the_command_line_is_refused(run, heights):
-    ran = run("brdf-map", heights, "--wavelength", "550", "--exposure", "0")
-    assert ran.code == 2
-    assert "--wavelength: not allowed with argument --exposure" in ran.err

@@ -151,23 +151,3 @@ def test_variants_without_wavelengths_say_so_and_render(run, folder, planned):
     assert ran.code == 0
     assert "warning: --plan: llvm_ad_mono looks up" in ran.err
     assert run("plan", folder / "foil.xml", "-m", "llvm_ad_mono").code == 1
-
-
-def test_usage(run, folder):
-    for arguments, says in (
-        (("render", "--plan", folder / "foil.xml"), "to have one made, write SCENE --plan"),
-        (("render", folder / "foil.xml", "--paths", 9), "--paths: is for --plan"),
-        (("plan", folder / "foil.xml", "--paths", 1), "expected a whole number from 2"),
-        (("plan", folder / "foil.xml", "--paths", 2**23), "--paths: at most"),
-        (
-            ("render", folder / "foil.xml", "--plan", "--frames", 2, "--turn", "elevation"),
-            "argument --plan: is for one picture",
-        ),
-    ):
-        ran = run(*arguments)
-        assert ran.code == 2
-        assert says in ran.err
-    missing = run("render", folder / "foil.xml", "--plan", folder / "no.toml")
-    assert "no.toml' does not exist" in missing.failed_in_one_line()
-    unknown = run("plan", folder / "foil.xml", "-D", "elevatoin=3")
-    assert "did you mean elevation?" in unknown.failed_in_one_line()

@@ -17,7 +17,8 @@ from tests.support import room
 from tests.support.logos import write_board
 from tests.support.plate import plate_file
 
-_SMALL = "--pixel-size 0.08 --coherence-width 6"
+_PIXEL = "--pixel-size 0.08"
+_SMALL = f"{_PIXEL} --coherence-width 6"
 _MAP = f"brdf-map grating.npy {_SMALL} --resolution 32 --step 47"
 _SPECTRUM = f"spectrum grating.npy {_SMALL} --wavelength-range 400:700 --step 50"
 _SWEEP = f"grating.npy {_SMALL} --resolution 32 --step 47"
@@ -25,10 +26,14 @@ _PRECOMPUTE = f"precompute grating.npy {_SMALL}"
 _RENDER = "render room.xml -m scalar_rgb"
 _FRAMES = f"{_RENDER} --frames 2"
 _LIGHT = "--animate spp=1:2"
+_GROOVE = "sinusoidal --period 1 --depth 0.1"
 _EVALUATE = (
     "evaluate grating.npy --pixel-size 0.08 --coherence-width 12 --step 40 --angle-step 0.5 "
     "--positions 2 --periodic exact"
 )
+
+#: Beginnings of files, called `NAME.exr`.
+DAMAGED = {"empty": b"", "exr": b"\x76\x2f\x31\x01", "png": b"\x89PNG\r\n\x1a\n", "ab": b"ab"}
 
 #: Command lines that name an unsuitable file or value, and the message: exit code 1.
 REFUSED = {
@@ -37,7 +42,6 @@ REFUSED = {
         "--wavelength-range 700:400": "700 to 400 nm",
         "--coherence-width -1": "coherence_width='-1'",
         "-o missing/a.exr": "cannot write 'missing/a.exr'",
-        "-m scalar_rgb": "variant 'scalar_rgb'",
         "--material Unobtainium": "Unobtainium",
         "--fill hope": "fill",
         "--method rainbow --relative": "no relative reflectance",
@@ -46,6 +50,7 @@ REFUSED = {
     "brdf-map": {
         "t.exr -o t.exr": "would overwrite",
         "t.exr --ext-ior water": "t.exr",
+        "t.exr --resolution 8 --step 100 -m llvm_ad_mono": "variant 'llvm_ad_mono'",
         "nothing.png": "nothing.png",
         "--preset dvdd": "did you mean dvd",
         "noise.npy --pixel-size 0.08 --method rainbow": "needs a period",
@@ -82,7 +87,10 @@ REFUSED = {
         "--material keratin --method flss": "method=flss",
         "-o missing/a.png": "cannot write",
     },
-    "evaluate": {"t.exr": "is a table; this needs the heights"},
+    "evaluate": {
+        "t.exr": "is a table; this needs the heights",
+        f"noise.npy {_SMALL} --method nmm": "needs a period",
+    },
     f"sweep terms {_SWEEP}": {
         "--coherence-width 1e300": "coherence_width",
         "--values a": "--values: expected numbers, got 'a'",
@@ -113,6 +121,7 @@ REFUSED = {
         "cut.npy": "'cut.npy'",
         "words.npy": "'words.npy'",
         "empty": "is a folder",
+        f"nm.npy {_SMALL}": "are the heights, with a range of ",
     },
     "tangents": {
         "none.obj -o a.ply": "'none.obj' does not exist",
@@ -126,6 +135,29 @@ REFUSED = {
         ".": "is a folder",
         "/": "is a folder",
     },
+    "info": {
+        "what.exr": "'what.exr'",
+        **{f"{name}.exr": f"'{name}.exr'" for name in DAMAGED},
+        **{f"{name}.ply": f"'{name}.ply'" for name in ("empty", "ply", "words")},
+        "words.stl": "convert it to PLY or OBJ",
+        "room.xml": "is a scene, which `mitsuba-diffraction render` renders; info describes",
+        "a.sxm": "Gwyddion",
+        f"grating.npy {_PIXEL} --crop 1e308": "larger than the patch",
+        f"grating.npy {_PIXEL} --crop 1e308,1": "larger than the patch",
+        f"grating.npy {_PIXEL} --crop 1,1e308": "larger than the patch",
+    },
+    "solve": {
+        "lamellar --depth 0.1": "period",
+        "lamellar --period 1": "depth",
+        "missing.csv --period 1": "missing.csv",
+        "heap --period 1": "expected one of",
+    },
+    f"solve {_GROOVE}": {"--duty 0.5": "duty", "--material Unob": "Unob", "-o no/x.nc": "folder"},
+    **{
+        command: {"groove.toml": "run the command 'solve groove.toml'"}
+        for command in ("precompute ", "info ", "brdf-map ", "evaluate ", "spectrum ")
+    },
+    "plan scale.xml": {"-D widht=3": "did you mean width?"},
     "hologram": {
         "red.png": "no colour beside its ground",
         "none.png": "'none.png' does not exist",
@@ -171,7 +203,11 @@ REFUSED = {
         "--turn format": "the turn of format begins at 'rgb', which is not an angle",
         "--animate ssp=0:1": "did you mean spp?",
     },
-    "render": {"none.xml": "none.xml", "empty": "is a folder"},
+    "render": {
+        "none.xml": "none.xml",
+        "empty": "is a folder",
+        "room.xml --plan no.toml -o a.exr": "no.toml' does not exist",
+    },
 }
 
 #: Command lines with unsuitable options, and the message after the command's name: exit code 2.
@@ -189,6 +225,9 @@ USAGE = {
         "--method flss --int-ior 1.5": "only for --relative",
         "--relative": "--relative: only with argument --method",
         "--method ray": "--method: invalid choice",
+    },
+    "brdf-map grating.npy": {
+        "--wavelength 550 --exposure 0": "--wavelength: not allowed with argument --exposure"
     },
     "spectrum": {
         "--group a": "NAME=PATTERN",
@@ -226,6 +265,28 @@ USAGE = {
         "grating.toml --method flss": "invalid choice",
     },
     "export-viewer plate.xml": {"-o page.pdf": ".html"},
+    "info": {
+        "": "--formats",
+        "a.png --formats": "argument FILE with --formats",
+        "--formats --level plane": "--level",
+        f"t.exr {_PIXEL}": "--pixel-size",
+        "t.exr --picture a.png": "is a table, not heights",
+        "t.exr --coherence-width 5": "is a table, not heights",
+        "t.exr --wavelength-range 400:700": "is a table, not heights",
+        f"grating.npy {_PIXEL} --albedo a.png": "not a table",
+    },
+    "solve lamellar --period 1 --depth 0.1": {
+        "--layer digits.toml": "argument --layer: 'digits.toml' is not TOML"
+    },
+    "render": {
+        "--plan scale.xml": "to have one made, write SCENE --plan",
+        "scale.xml --paths 9": "--paths: is for --plan",
+        "scale.xml --plan --frames 2 --turn width": "argument --plan: is for one picture",
+    },
+    "plan scale.xml": {
+        "--paths 1": "expected a whole number from 2",
+        f"--paths {2**23}": "--paths: at most",
+    },
     _RENDER: {
         "-D spp": "-D",
         "-D =3": "-D",
@@ -237,6 +298,7 @@ USAGE = {
         "-o a.jpg": "a.jpg",
         "-o folder": "folder",
         "--observer dog --denoise": "one picture in one process",
+        "--denoise --workers 2": "is for one process",
         "--observer dog -o a.png": "writes an EXR",
         "--illuminant leaves": "--observer; name one",
         "--frames 2": "say what changes, with --animate or --turn",
@@ -267,8 +329,16 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "room.xml": room.SCENE,
         "dull.xml": room.SCENE,
         "flat.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",
-        **{f"words.{suffix}": "words" for suffix in ("exr", "npy")},
+        **{f"words.{suffix}": "words" for suffix in ("exr", "npy", "ply", "stl")},
+        "empty.ply": "",
+        "ply.ply": "ply",
+        "a.sxm": ":NANONIS_VERSION:\n2\n",
+        "digits.toml": f"repeat = {5000 * '9'}\n",
+        "groove.toml": 'method = "solved"\nprofile = "sinusoidal"\nmaterial = "none"\n'
+        'output = "groove.nc"\n[arguments]\nperiod = 0.5\ndepth = 0.05\n',
     }
+    for name, content in DAMAGED.items():
+        (folder / f"{name}.exr").write_bytes(content)
     for name, text in texts.items():
         (folder / name).write_text(text)
     write_board(folder / "bare.obj", with_uv=False)
@@ -277,7 +347,9 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "empty.npy").touch()
     (folder / "cut.npy").write_bytes(b"\x93NUMPY\x01\x00")
     x = np.arange(75) * 0.08
-    np.save(folder / "grating.npy", np.tile(0.02 * np.sin(2 * np.pi * x / 3.0), (75, 1)))
+    grating = np.tile(0.02 * np.sin(2 * np.pi * x / 3.0), (75, 1))
+    np.save(folder / "grating.npy", grating)
+    np.save(folder / "nm.npy", 1e4 * grating)
     np.save(folder / "noise.npy", np.random.default_rng(1).normal(0.0, 0.02, (64, 64)))
     Image.new("RGB", (9, 9), "red").save(folder / "red.png")
     OpenEXR.File({}, {"height": np.zeros((4, 4), np.float32)}).write(str(folder / "depth.exr"))

@@ -48,12 +48,6 @@ def test_frames_are_denoised_without_flicker(run, scene):
     assert np.array_equal(clean[0], clean[1])
 
 
-def test_workers_do_not_denoise(run, scene):
-    ran = run("render", scene, *QUICK, "--denoise", "--workers", "2")
-    assert ran.code == 2
-    assert "is for one process" in ran.err
-
-
 def test_wavelengths_of_samples_leave_no_noise_of_colour(run, scene):
     pytest.importorskip("pyoidn")
     with open(scene, encoding="utf-8") as file:

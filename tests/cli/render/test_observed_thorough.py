@@ -18,8 +18,9 @@ _WHITE = SCENE.replace(
 _EMPTY = _WHITE.replace('<shape type="sphere"><bsdf type="diffuse"/></shape>', "")
 
 
-@pytest.mark.parametrize("light", [None, "leaves"])
-@pytest.mark.parametrize("name", EYES)
+@pytest.mark.parametrize(
+    ("name", "light"), [*((name, None) for name in EYES), ("avian_uv", "leaves")]
+)
 def test_a_scene_of_white_light_has_the_catches_of_that_light(run, here, name, light):
     (here / "white.xml").write_text(_EMPTY)
     asked = ["--illuminant", light] if light else []

@@ -87,19 +87,15 @@ def lights_of(value):
 
 
 @pytest.mark.parametrize(
-    ("periods", "value", "message"),
+    ("periods", "value", "options", "message"),
     [
-        ((0.4, 2000.0), 0.1, "period=2000"),
-        ((0.4, float("nan")), 0.1, "must be"),
-        ((0.4, 0.4), 0.6, "sum to 1.2"),
-        ((0.4, 0.4), -0.1, "at least 0"),
+        ((0.4, 2000.0), 0.1, {}, "period=2000"),
+        ((0.4, float("nan")), 0.1, {}, "must be"),
+        ((0.4, 0.4), 0.6, {}, "sum to 1.2"),
+        ((0.4, 0.4), -0.1, {}, "at least 0"),
+        ((0.4, 0.4), 0.1, {"superstrate": 1.5}, "in air"),
     ],
 )
-def test_what_is_no_table_is_refused(periods, value, message):
+def test_what_is_no_table_is_refused(periods, value, options, message):
     with pytest.raises(DiffractionError, match=message):
-        listed_table(lights_of(value), periods, {})
-
-
-def test_crossed_gratings_lie_in_air():
-    with pytest.raises(DiffractionError, match="in air"):
-        listed_table(lights_of(0.1), (0.4, 0.4), {}, superstrate=1.5)
+        listed_table(lights_of(value), periods, {}, **options)
