@@ -197,9 +197,10 @@ def _by_bsdf(
     args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
 ) -> tuple[Any, str, str]:
     """Map the renderer's BSDF; also return its surface and the variant in words."""
-    from ..analysis.maps import brdf_map
+    from ..analysis.maps import brdf_map, check_variant
 
     variant = set_variant(args.mode)
+    check_variant(bands, args.illuminant, args.spectral)
     notes = _notes(args)
     with mitsuba_warnings(), Bar(args) as bar:
         with warnings.catch_warnings():

@@ -38,6 +38,7 @@ DAMAGED = {"empty": b"", "exr": b"\x76\x2f\x31\x01", "png": b"\x89PNG\r\n\x1a\n"
 #: Command lines that name an unsuitable file or value, and the message: exit code 1.
 REFUSED = {
     _MAP: {
+        "-m scalar_rgb": "variant 'scalar_rgb' does not support maps",
         "--theta 90": "theta=90 must be at least 0 and below 90",
         "--wavelength-range 700:400": "700 to 400 nm",
         "--coherence-width -1": "coherence_width='-1'",

@@ -4,6 +4,7 @@ Contents
 --------
 brdf_map        evaluate a BSDF over the hemisphere
 check_map       check the parameters of `brdf_map` before any work
+check_variant   check the current variant likewise
 BrdfMap         colours and spectra of a map
 LightDirection  direction to the light
 Bands           bands of wavelengths to sum over
@@ -14,7 +15,7 @@ save_exr        write a map as linear numbers
 
 from __future__ import annotations
 
-from .evaluate import brdf_map, check_map
+from .evaluate import brdf_map, check_map, check_variant
 from .picture import draw, save_exr, save_png
 from .result import Bands, BrdfMap, LightDirection
 
@@ -24,6 +25,7 @@ __all__ = [
     "LightDirection",
     "brdf_map",
     "check_map",
+    "check_variant",
     "draw",
     "save_exr",
     "save_png",

@@ -78,7 +78,7 @@ def brdf_map(
     bands = Bands.choose(wavelength_range, step, wavelength)
     check_choice("illuminant", illuminant, ILLUMINANTS)
     check_map(bands, resolution, samples, spectral)
-    _check_variant(bands, illuminant, spectral)
+    check_variant(bands, illuminant, spectral)
     require_loaded_llvm()
     if (described := describe(bsdf)) is not None:
         MAPS.check(described)
@@ -111,8 +111,8 @@ def brdf_map(
     )
 
 
-def _check_variant(bands: Bands, illuminant: str, spectral: bool) -> None:
-    """Refuse a variant in which the map cannot be evaluated."""
+def check_variant(bands: Bands, illuminant: str, spectral: bool) -> None:
+    """Refuse the current variant if the map cannot be evaluated in it."""
     if not (mi.is_spectral or mi.is_rgb) or mi.is_polarized or "scalar" in mi.variant():
         raise DiffractionError(
             f"variant '{mi.variant()}' does not support maps; use llvm_ad_spectral, llvm_ad_rgb, "
