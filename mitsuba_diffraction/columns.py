@@ -33,12 +33,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .arrays import Real
 from .atomic import atomic_path
 from .errors import DiffractionError, printable, quoted
 from .files import readable_file
 from .limits import LARGEST_LISTING, bounded_lines
-
-Reals = NDArray[np.float64]
 
 #: nm in one unit of wavelength that a header states.
 WAVELENGTH_UNITS = {
@@ -75,13 +74,13 @@ class Columns(NamedTuple):
 
     names: tuple[str, ...]
     units: tuple[str, ...]
-    numbers: Reals
+    numbers: Real
     lines: NDArray[np.int64]
     header: dict[int, str]
     words: dict[tuple[int, int], str]
     shown: str
 
-    def of(self, wanted: Iterable[str]) -> Reals:
+    def of(self, wanted: Iterable[str]) -> Real:
         """Return the columns of these names, (rows, n), all numbers finite.
 
         Raises a DiffractionError if a name is missing or there twice, or a number is missing.
@@ -95,7 +94,7 @@ class Columns(NamedTuple):
                 )
         return self.finite([self.names.index(name) for name in wanted], ", ".join(wanted))
 
-    def finite(self, columns: Sequence[int], what: str) -> Reals:
+    def finite(self, columns: Sequence[int], what: str) -> Real:
         """Return columns by number, (rows, n); refuse words and missing numbers, with their line.
 
         what : the numbers expected, for messages.
@@ -107,7 +106,7 @@ class Columns(NamedTuple):
             raise DiffractionError(f"{self.shown}, line {line}: expected numbers: {what}")
         return chosen
 
-    def with_gaps(self, columns: Sequence[int], what: str) -> Reals:
+    def with_gaps(self, columns: Sequence[int], what: str) -> Real:
         """Return columns by number, (rows, n), NaN where numbers are missing; refuse words."""
         if not len(self.numbers) or max(columns) >= self.numbers.shape[1]:
             raise DiffractionError(f"{self.shown} has no lines of numbers; expected {what}")
@@ -178,7 +177,7 @@ def read_columns(path: str | os.PathLike[str], largest: int = LARGEST_LISTING) -
 
 def parse_columns(lines: Iterable[str], shown: str) -> Columns:
     """Read the numbers of lines of text; see `read_columns`."""
-    rows: list[Reals] = []
+    rows: list[Real] = []
     places: list[int] = []
     header: dict[int, str] = {}
     words: dict[tuple[int, int], str] = {}
@@ -278,7 +277,7 @@ def _of_csv(text: str) -> list[str]:
     return [c.replace(",", ".") if _DECIMAL_COMMA.fullmatch(c.strip()) else c for c in cells]
 
 
-def _row(cells: list[str]) -> tuple[Reals, list[int]]:
+def _row(cells: list[str]) -> tuple[Real, list[int]]:
     """Return the numbers of a row, NaN for words and gaps, and the places of words."""
     try:
         row = np.array(list(map(float, cells)))

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .columns import WAVELENGTH_UNITS, Columns, Reals, read_columns
+from .arrays import Real
+from .columns import WAVELENGTH_UNITS, Columns, read_columns
 from .errors import DiffractionError, warn
 
 #: Suffixes of spectra: text, and what software of spectrometers names its text.
@@ -54,7 +55,7 @@ def choice_of(text: str) -> Choice:
 
 def read_spectra(
     choice: Choice | str | os.PathLike[str], what: str, every: bool = False
-) -> tuple[Reals, Columns]:
+) -> tuple[Real, Columns]:
     """Read spectra: a column of wavelengths and one of values, or several.
 
     choice : the file, and perhaps the name of the column.
@@ -95,7 +96,7 @@ def read_spectra(
     )  # fmt: skip
 
 
-def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Reals, Reals]:
+def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real, Real]:
     """Read a spectrum of shares, such as a reflectance.
 
     Per cent or fraction is what the text says, else the header, else a guess by the values, which a
@@ -140,7 +141,7 @@ def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real
     return lam, np.clip(value, 0.0, 1.0)
 
 
-def _share_unit(choice: Choice, table: Columns, inside: Reals, what: str) -> float:
+def _share_unit(choice: Choice, table: Columns, inside: Real, what: str) -> float:
     """Return the share that 1 in the file means."""
     if choice.unit:
         return SHARE_UNITS[choice.unit]
@@ -161,7 +162,7 @@ def _share_unit(choice: Choice, table: Columns, inside: Reals, what: str) -> flo
     return 0.01
 
 
-def _in_nm(values: Reals, unit: str, shown: str) -> Reals:
+def _in_nm(values: Real, unit: str, shown: str) -> Real:
     """Return wavelengths in nm; a unit that makes no light of them is overruled aloud."""
     stated = WAVELENGTH_UNITS.get(unit.lower(), WAVELENGTH_UNITS.get(unit.lower().rstrip("s")))
     guesses = {name: WAVELENGTH_UNITS[name] for name in ("nm", "µm")}

@@ -13,15 +13,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..progress import Progress, silent
 from .spectra import spectrum
 from .spectral_variables import RANGE, colours_of
-
-Reals = NDArray[np.float64]
 
 #: Angles of lamps and detectors, degrees. Each detector is 5° or more from the mirror direction,
 #: whose light any smooth surface reflects.
@@ -63,7 +62,7 @@ def angular_variables(
     return fitted(np.repeat(LAMPS, len(DETECTORS)), collected, brightness, hue)
 
 
-def fitted(incident: Reals, collected: Reals, brightness: Reals, hue: Reals) -> dict[str, float]:
+def fitted(incident: Real, collected: Real, brightness: Real, hue: Real) -> dict[str, float]:
     """Fit the five variables to brightness (%) and hue (nm) at signed angles (n,) in degrees.
 
     B = Bmax exp(−(x − t)²/2γB²) with x = (Θinc + Θcol)/2, 0 in the mirror direction, and

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft, ndimage, optimize
 
 from .. import reference
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..heights.field import HeightField, check_pixel_count
 from ..heights.lengths import PixelSize
@@ -32,7 +33,6 @@ from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_o
 from ..reference.arguments import directions_of, index_of
 from ..reference.fresnel import reflectance
 
-Real = NDArray[np.float64]
 #: Loss of BRDFs (n,): returns its value and its derivatives (n,).
 Loss = Callable[[Real], tuple[float, Real]]
 

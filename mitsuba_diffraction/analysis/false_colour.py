@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..optics.colour import encode_srgb
 from .observers import GRID, Eye, responses
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Reals = NDArray[np.float64]
 
 # Share of the pixels that are brighter than white.
 _WHITE = 0.02
@@ -32,7 +31,7 @@ def shown_receptors(count: int) -> list[tuple[int, int, int]]:
     return [(n + 2, n + 1, n) for n in reversed(range(count - 2))]
 
 
-def adapted(channels: Reals) -> Reals:
+def adapted(channels: Real) -> Real:
     """Return catches (h, w, receptors) over each receptor's mean over the picture.
 
     Receptors without light stay 0.
@@ -41,9 +40,7 @@ def adapted(channels: Reals) -> Reals:
     return np.asarray(channels / np.where(mean > 0.0, mean, 1.0))
 
 
-def false_colour_figure(
-    channels: Reals, eye: Eye, exposure: float = 0.0, title: str = ""
-) -> Figure:
+def false_colour_figure(channels: Real, eye: Eye, exposure: float = 0.0, title: str = "") -> Figure:
     """Draw pictures in false colour above the responses of the receptors that they show.
 
     Each receptor is adapted to the mean of the picture, as after von Kries.

@@ -22,14 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, median
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import sigma_of, wavenumber
 from ..tables.powers import order_0_power, power_series
 from ..tables.table import DiffractionTable
 from .maps.result import LightDirection
-
-Reals = NDArray[np.float64]
 
 #: Coherence width of the index, µm; its lobes are 3.3° wide (half maximum, 550 nm, at the normal),
 #: about the acceptance of a fibre. It is the narrowest window that whole scans are used with.
@@ -63,7 +62,7 @@ class DiffractedLight:
     share : luminous power outside the mirror's lobe, as a share of all reflected light.
     """
 
-    xyz: Reals
+    xyz: Real
     share: float
 
     def brightest(self) -> tuple[float, float, float]:
@@ -113,7 +112,7 @@ class DiffractedLight:
         total = np.bincount(sextant, xyz[:, 1], minlength=7)
         return dict(zip(names, (total / total.sum()).tolist(), strict=True))
 
-    def _coloured(self) -> Reals:
+    def _coloured(self) -> Real:
         """Return X, Y, Z (m, 3) of the cells that have enough light for a colour."""
         luminance = self.xyz[..., 1]
         lit = luminance > _DARK * luminance.max(initial=0.0)
@@ -122,7 +121,7 @@ class DiffractedLight:
 
 #: Factor of a material on the power of an order, and w = κ/k: functions of the sines (n, 2) of
 #: directions and a wavelength, nm; see `MaterialFactor.at`.
-Factor = Callable[[Reals, float], tuple[Reals, Reals]]
+Factor = Callable[[Real, float], tuple[Real, Real]]
 
 # Polar angles, and azimuths from the light's, at which a material's factor is tabulated, degrees.
 _POLAR, _AZIMUTHS = np.linspace(0.0, 90.0, 91), np.linspace(0.0, 180.0, 37)
@@ -141,9 +140,9 @@ class MaterialFactor:
     excess : (n, polar, azimuths), w less the sum of both cosines, which a coat changes.
     """
 
-    wavelengths: Reals
-    factor: Reals
-    excess: Reals
+    wavelengths: Real
+    factor: Real
+    excess: Real
 
     @classmethod
     def of(cls, bsdf: Any, theta: float) -> MaterialFactor:
@@ -183,7 +182,7 @@ class MaterialFactor:
     def at(self, light: LightDirection) -> Factor:
         """Return the factor for light from a direction, whose polar angle is the table's."""
 
-        def factor(sines: Reals, wavelength: float) -> tuple[Reals, Reals]:
+        def factor(sines: Real, wavelength: float) -> tuple[Real, Real]:
             n = int(np.argmin(np.abs(self.wavelengths - wavelength)))
             radius = np.minimum(np.hypot(*sines.T), 1.0)
             turn = np.arctan2(sines[:, 1], sines[:, 0]) - math.radians(light.phi)
@@ -248,7 +247,7 @@ def _by_direction(
     table: DiffractionTable,
     light: LightDirection,
     factor: Factor | None,
-    speckles: Sequence[Reals] = (),
+    speckles: Sequence[Real] = (),
 ) -> list[DiffractedLight]:
     """Collect the orders, and once more for each field of factors that replaces their powers.
 
@@ -313,7 +312,7 @@ def _by_direction(
     return [DiffractedLight(*both) for both in zip(xyz, shares.tolist(), strict=True)]
 
 
-def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
+def _obliquity(sines: Real, cosine: Real, light: LightDirection) -> Real:
     """Return the power of an order over |a_j|²: ((1 + ωi·ωo)/w)² / (cosθi cosθo) (n,).
 
     The integral of equation 4 of docs/theory.md over the lobe, R = 1; 1 in the mirror direction.
@@ -325,7 +324,7 @@ def _obliquity(sines: Reals, cosine: Reals, light: LightDirection) -> Reals:
     return np.asarray((dot / w) ** 2 / (cos_i * cosine))
 
 
-def _spread(sines: Reals, powers: Reals, lobe: float, out: NDArray[np.float32]) -> None:
+def _spread(sines: Real, powers: Real, lobe: float, out: NDArray[np.float32]) -> None:
     """Distribute powers (m, n) at sines (n, 2) over cells (m, count, count), with their lobes."""
     count = out.shape[-1]
     position = sines / _CELL + 0.5 * count
@@ -346,7 +345,7 @@ def _spread(sines: Reals, powers: Reals, lobe: float, out: NDArray[np.float32]) 
         np.maximum(field, 0.0, out=field)
 
 
-def _chromaticity(xyz: Reals) -> Reals:
+def _chromaticity(xyz: Real) -> Real:
     """Return u', v' of CIE 1976: 4X and 9Y over X + 15Y + 3Z."""
     weights = np.array([1.0, 15.0, 3.0])
     total = np.maximum(xyz @ weights, 1e-300)

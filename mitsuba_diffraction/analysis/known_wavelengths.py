@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.materials import PERFECT, lets_light_through, material_named
 from ..plugin.conductors import tabulated_range, unknown_conductor
 from ..plugin.parameters import refusal
 from ..plugin.pigment import pigment_range
-
-Reals = NDArray[np.float64]
 
 
 def known_range(material: str | None, pigment: str | None = None) -> tuple[float, float]:
@@ -36,7 +32,7 @@ def known_range(material: str | None, pigment: str | None = None) -> tuple[float
     return max(first, least), min(last, most)
 
 
-def check_material(material: str | None, wavelengths: Reals, pigment: str | None = None) -> None:
+def check_material(material: str | None, wavelengths: Real, pigment: str | None = None) -> None:
     """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
     known_range(material, pigment)
     of_each = {f"material='{material}'": known_range(material)}

@@ -38,13 +38,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Real
 from ..errors import DiffractionError, quoted
 from ..optics.colour import cone_fundamentals, illuminant_power, leaf_green
 from ..text_spectra import SPECTRA, choice_of, read_spectra
-
-Reals = NDArray[np.float64]
 
 #: Wavelengths of sensitivities, nm: the range in which animals see.
 GRID = np.arange(300.0, 701.0)
@@ -79,7 +78,7 @@ class Eye:
     """
 
     names: tuple[str, ...]
-    sensitivity: Reals
+    sensitivity: Real
     density: tuple[float, ...]
     weber: tuple[float, ...] = (WEBER,)
     weber_luminance: float = WEBER
@@ -111,7 +110,7 @@ class Eye:
         )
 
 
-def pigment_template(peak: float, beta: bool = True) -> Reals:
+def pigment_template(peak: float, beta: bool = True) -> Real:
     """Return the absorbance of an A1 pigment with this λmax in nm at `GRID`, its maximum 1."""
     x = peak / GRID
     a = 0.8795 + 0.0459 * np.exp(-((peak - 300.0) ** 2) / 11940.0)
@@ -124,7 +123,7 @@ def pigment_template(peak: float, beta: bool = True) -> Reals:
     return np.asarray(alpha / alpha.max())
 
 
-def droplet_transmittance(kind: str, cut: float) -> Reals:
+def droplet_transmittance(kind: str, cut: float) -> Real:
     """Return the transmittance of an oil droplet at `GRID`: C, Y, R, P by λcut in nm; T, clear."""
     if kind == "T":
         return np.ones_like(GRID)
@@ -133,7 +132,7 @@ def droplet_transmittance(kind: str, cut: float) -> Reals:
     return np.asarray(np.exp(-np.exp(-2.89 * gradient * (GRID - cut) + 1.08)))
 
 
-def bird_media() -> Reals:
+def bird_media() -> Real:
     """Return the transmittance of a blue tit's ocular media at `GRID`, the polynomial of pavo."""
     terms = (8.928e-13, -2.595e-9, 3.006e-6, -0.001736, 0.5013, -55.56)
     return np.asarray(np.maximum(np.log(np.maximum(np.polyval(terms, GRID), 1e-300)), 0.0))
@@ -141,7 +140,7 @@ def bird_media() -> Reals:
 
 def _modelled(
     peaks: Sequence[float], density: Sequence[float], droplets: str = "",
-    cuts: Sequence[float] = (), media: Reals | None = None, names: str = "usml",
+    cuts: Sequence[float] = (), media: Real | None = None, names: str = "usml",
 ) -> Eye:  # fmt: skip
     """Model an eye from its pigments."""
     # the droplets of birds hide the β band, which pavo leaves out of their eyes
@@ -212,7 +211,7 @@ def eye_of(name: str) -> Eye:
 
 def _columns(
     name: str, parameter: str, known: Collection[str], columns: str
-) -> tuple[tuple[str, ...], Reals]:
+) -> tuple[tuple[str, ...], Real]:
     """Return the names of the columns of a text, and its numbers, wavelengths (nm) first.
 
     Raises a DiffractionError if the file holds no spectrum, or the name is unknown; the message on
@@ -230,7 +229,7 @@ def _columns(
     return table.names, np.column_stack([lam, table.numbers])
 
 
-def illuminant_of(name: str) -> Reals:
+def illuminant_of(name: str) -> Real:
     """Return the quanta of a light at `GRID`, of mean 1: by name, or from a text of photons.
 
     name : one of `ILLUMINANTS`, or a text of wavelengths and relative photons, see
@@ -253,12 +252,12 @@ def illuminant_of(name: str) -> Reals:
     return _of_mean_1(np.interp(GRID, table[:, 0], table[:, 1]))
 
 
-def _of_mean_1(quanta: Reals) -> Reals:
+def _of_mean_1(quanta: Real) -> Real:
     """Scale a light."""
     return np.asarray(quanta / quanta.mean())
 
 
-def _under_leaves() -> Reals:
+def _under_leaves() -> Real:
     """Return a model of forest shade: daylight through gaps, and sunlight through green leaves.
 
     The transmittance of leaves is taken to have the shape of their colour in reflection, CIE's test
@@ -270,7 +269,7 @@ def _under_leaves() -> Reals:
     return _GAPS * illuminant_of("d65") + (1.0 - _GAPS) * _of_mean_1(through)
 
 
-def relit(light: str) -> Reals:
+def relit(light: str) -> Real:
     """Return factors (GRID,) that turn daylight, D65, into another light of as many quanta.
 
     light : as in `illuminant_of`.
@@ -278,7 +277,7 @@ def relit(light: str) -> Reals:
     return np.asarray(illuminant_of(light) / illuminant_of("d65"))
 
 
-def responses(eye: Eye) -> Reals:
+def responses(eye: Eye) -> Real:
     """Return the responses (receptors, GRID) to power, 1/nm, of integral 1: catches of quanta.
 
     Sensitivities below a thousandth of the largest are 0, so that a table need not serve them.
@@ -290,7 +289,7 @@ def responses(eye: Eye) -> Reals:
 
 def quantum_catches(
     eye: Eye, wavelengths: ArrayLike, value: ArrayLike, illuminant: ArrayLike = 1.0
-) -> Reals:
+) -> Real:
     """Return the catches Q = ∫ R S I dλ (spectra, receptors), over nanometres; pavo's `Qi`.
 
     Raises a DiffractionError if the wavelengths do not cover the eye's range.
@@ -312,7 +311,7 @@ def quantum_catches(
     return np.asarray(fine * illuminant @ eye.sensitivity.T)
 
 
-def noises(eye: Eye) -> Reals:
+def noises(eye: Eye) -> Real:
     """Return the noise e of each receptor's channel, `Eye.weber` of the longest waves or of all."""
     if len(eye.weber) > 1:
         return np.array(eye.weber)
@@ -320,7 +319,7 @@ def noises(eye: Eye) -> Reals:
     return np.asarray(eye.weber[0] * np.sqrt(density[-1] / density))
 
 
-def luminance_contrasts(eye: Eye, catches: ArrayLike) -> Reals:
+def luminance_contrasts(eye: Eye, catches: ArrayLike) -> Real:
     """Return contrasts of luminance ΔL (spectra, spectra) in just noticeable differences.
 
     ΔL = |ln(L1/L2)| / e, as in pavo's `coldist`. Dark spectra have none, nan.
@@ -333,7 +332,7 @@ def luminance_contrasts(eye: Eye, catches: ArrayLike) -> Reals:
     return np.asarray(result)
 
 
-def contrasts(catches: ArrayLike, noise: ArrayLike) -> Reals:
+def contrasts(catches: ArrayLike, noise: ArrayLike) -> Real:
     """Return chromatic distances ΔS (spectra, spectra) in just noticeable differences.
 
     Vorobyev and Osorio's eq. 3 to 5 for any number of receptors, with log catches: differences Δf

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
-from ..heights.field import FloatArray, HeightField
+from ..arrays import Real
+from ..heights.field import HeightField
 from ..heights.spectra import far_field, height_spectrum, order_powers, profile
 from ..tables.energy.conservation import Conservation, SurfaceEnergy
 from ..tables.energy.conserved import Reflector
@@ -112,7 +113,7 @@ def _light(axes: Axes, field: HeightField) -> None:
     axes.text(0.5, 1.02, text, transform=axes.transAxes, ha="center", fontsize=8)
 
 
-def colour_field(field: HeightField, size: int = 301) -> FloatArray:
+def colour_field(field: HeightField, size: int = 301) -> Real:
     """Return far fields at 650, 550 and 450 nm as red, green, blue, (size, size, 3) in [0, 1]."""
     light = np.stack([far_field(field, w, size) for w in (RED, GREEN, BLUE)], axis=-1)
     bright = np.log(np.maximum(light, _DARKEST) / _DARKEST) / np.log(_BRIGHTEST / _DARKEST)

@@ -22,8 +22,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Real
 from ..errors import DiffractionError, check_choice
 from ..llvm import require_loaded_llvm
 from ..optics.colour import LONGEST, SHORTEST
@@ -36,8 +37,6 @@ from .known_wavelengths import check_material, known_range
 from .maps.evaluate import opaque
 from .maps.hemisphere import flat_interaction
 from .spectrometer import MeasurementGeometry, across_plane, cone, light_direction, lobe_width
-
-Reals = NDArray[np.float64]
 
 #: What spectra are relative to: a white standard, a perfect mirror at its own angle, or the light
 #: that falls on the surface.
@@ -71,13 +70,13 @@ class Spectra:
     relative : one of `RELATIVE`.
     """
 
-    wavelength: Reals
-    value: Reals
+    wavelength: Real
+    value: Real
     geometry: MeasurementGeometry
     relative: str
-    s: Reals | None = None
-    p: Reals | None = None
-    error: Reals | None = None
+    s: Real | None = None
+    p: Real | None = None
+    error: Real | None = None
     angular: tuple[dict[str, float], ...] = ()
 
     def names(self, group: str = "") -> list[str]:
@@ -85,9 +84,9 @@ class Spectra:
         words = re.sub(r"[^\w.]", "_", group)
         return [f"{words}_{name}" if words else name for name in self.geometry.names]
 
-    def columns(self, group: str = "") -> dict[str, Reals]:
+    def columns(self, group: str = "") -> dict[str, Real]:
         """Return the spectra by name: each detector's, and its s and p if there are any."""
-        columns: dict[str, Reals] = {}
+        columns: dict[str, Real] = {}
         for suffix, values in (("", self.value), ("_s", self.s), ("_p", self.p)):
             if values is not None:
                 names = (f"{name}{suffix}" for name in self.names(group))
@@ -165,7 +164,7 @@ def spectrum(
     return Spectra(lam, value, geometry, relative, s, p)
 
 
-def _usual(described: Description | None) -> Reals:
+def _usual(described: Description | None) -> Real:
     """Return the default wavelengths (n,), nm, at which a surface is known."""
     lam = np.arange(FIRST, LAST + 1.0, STEP)
     if not isinstance(described, Surface):
@@ -174,7 +173,7 @@ def _usual(described: Description | None) -> Reals:
     return lam[(lam >= max(first, described.shortest_wavelength)) & (lam <= last)]
 
 
-def check_wavelengths(wavelengths: ArrayLike) -> Reals:
+def check_wavelengths(wavelengths: ArrayLike) -> Real:
     """Return wavelengths (n,) in nm, increasing; refuse others."""
     lam = np.asarray(wavelengths, np.float64)
     if lam.ndim != 1 or not 1 <= lam.size <= MAX_WAVELENGTHS or not np.isfinite(lam).all():
@@ -196,7 +195,7 @@ def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
         return first
     values = np.stack([each.value for each in spectra])
 
-    def mean_of(parts: Sequence[Reals | None]) -> Reals | None:
+    def mean_of(parts: Sequence[Real | None]) -> Real | None:
         there = [part for part in parts if part is not None]
         return np.mean(there, axis=0) if there else None
 
@@ -210,13 +209,13 @@ def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
     )
 
 
-def table_range(wavelengths: Reals) -> tuple[float, float]:
+def table_range(wavelengths: Real) -> tuple[float, float]:
     """Return the range of a table, nm, for wavelengths (n,) and the light that Mitsuba renders."""
     # Mitsuba loads no table that begins later
     return min(wavelengths[0], SHORTEST), max(wavelengths[-1], LONGEST)
 
 
-def brdf_values(bsdf: Any, wi: Reals, wo: Reals, wavelength: Reals) -> Reals:
+def brdf_values(bsdf: Any, wi: Real, wo: Real, wavelength: Real) -> Real:
     """Return f (n,), 1/sr, of a BSDF at unit vectors (n, 3) and wavelengths (n,) in nm.
 
     bsdf : of the current variant, spectral and vectorised.
@@ -232,10 +231,10 @@ def _signals(
     bsdf: Any,
     sigma: float | None,
     geometry: MeasurementGeometry,
-    lam: Reals,
+    lam: Real,
     before: Callable[[float], None] | None,
     progress: Progress,
-) -> Reals:
+) -> Real:
     """Return P, (1 or 3, n, detectors): unpolarised, and in a polarised variant s and p."""
     lobe, count = lobe_width(sigma, lam), len(geometry.detectors)
     parts, done = [], 0
@@ -254,10 +253,10 @@ def _signals(
 def _integrals(
     bsdf: Any,
     geometry: MeasurementGeometry,
-    lam: Reals,
+    lam: Real,
     before: Callable[[float], None] | None,
-    cones: Sequence[tuple[Reals, Reals]],
-) -> Reals:
+    cones: Sequence[tuple[Real, Real]],
+) -> Real:
     """Return ∫ f cosθo dωo over cones of equal numbers of nodes, (1 or 3, n, cones).
 
     The detector is Mitsuba's camera and the lamp its emitter: `eval` has the lamp's cosine, and its
@@ -291,7 +290,7 @@ def _integrals(
     return sums
 
 
-def _stokes(light: Reals, across: Reals) -> Reals:
+def _stokes(light: Real, across: Real) -> Real:
     """Return the Stokes vector (3,) of s light from the lamp about Mitsuba's axes of that light."""
     direction = -light
     basis = np.array(mi.mueller.stokes_basis(mi.Vector3f(*direction.tolist())), np.float64).ravel()
@@ -299,7 +298,7 @@ def _stokes(light: Reals, across: Reals) -> Reals:
     return np.array([1.0, math.cos(double), math.sin(double)])
 
 
-def _of_mirror(sigma: float | None, geometry: MeasurementGeometry, lam: Reals) -> Reals:
+def _of_mirror(sigma: float | None, geometry: MeasurementGeometry, lam: Real) -> Real:
     """Return P (n, 1) of a perfect mirror of the same coherence, where it reflects the lamp to.
 
     Its f is f_0 of `optics.mirror` for R = 1.

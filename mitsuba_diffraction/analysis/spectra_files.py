@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Real
 from ..columns import save_numbers, save_rows
 from ..errors import DiffractionError
 from ..optics.colour import encode_srgb
 from .angular_variables import VARIABLES
 from .observers import Eye, contrasts, luminance_contrasts, noises, quantum_catches
-from .spectra import Reals, Spectra
+from .spectra import Spectra
 from .spectral_variables import colours_of, daylit
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def save_angular(groups: Groups, path: Any) -> None:
 
 
 def save_catches(
-    groups: Groups, eye: Eye, illuminant: Reals, catches_path: Any, contrasts_path: Any
+    groups: Groups, eye: Eye, illuminant: Real, catches_path: Any, contrasts_path: Any
 ) -> None:
     """Write quantum catches of each spectrum, and contrasts of colour and luminance in JND.
 
@@ -123,12 +124,12 @@ def save_catches(
     save_rows(contrasts_path, columns, pairs, digits=6)
 
 
-def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:
+def _write(path: str | os.PathLike[str], wavelength: Real, columns: dict[str, Real]) -> None:
     rows = np.column_stack([wavelength, *(100.0 * each for each in columns.values())])
     save_numbers(Path(path), ["wl", *columns], rows, "%.6g")
 
 
-def colour_of(spectra: Spectra) -> Reals:
+def colour_of(spectra: Spectra) -> Real:
     """Return the colour of each spectrum in daylight, (detectors, 3) sRGB, as dark as ink."""
     linear = daylit(spectra)
     brightest = linear.max(axis=1, keepdims=True)

@@ -12,12 +12,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..optics.colour import encode_srgb, linear_srgb, response
 from .spectra import Spectra
-
-Reals = NDArray[np.float64]
 
 #: Range of wavelengths of birds' vision, nm, over which pavo's variables are taken.
 RANGE = (300.0, 700.0)
@@ -49,14 +47,14 @@ def colours_of(spectra: Spectra) -> list[dict[str, Any]]:
     return rows
 
 
-def daylit(spectra: Spectra) -> Reals:
+def daylit(spectra: Spectra) -> Real:
     """Return the colours in daylight, linear sRGB without negative parts, (detectors, 3)."""
     lam = spectra.wavelength
     step = np.gradient(lam) if lam.size > 1 else np.ones(1)
     return np.maximum(linear_srgb(spectra.value.T @ (response(lam) * step[:, None])), 0.0)
 
 
-def _pavo(lam: Reals, curve: Reals) -> dict[str, Any]:
+def _pavo(lam: Real, curve: Real) -> dict[str, Any]:
     """Return pavo's variables of a spectrum (n,) in per cent."""
     grid = np.arange(np.ceil(max(lam[0], RANGE[0])), min(lam[-1], RANGE[1]) + 0.5)
     if grid.size < 2:

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.geometry import wavenumber
 from .maps.hemisphere import polar
-
-Reals = NDArray[np.float64]
 
 #: Steepest direction of a lamp or of the edge of a detector's cone, degrees.
 STEEPEST = 89.0
@@ -76,22 +74,22 @@ class MeasurementGeometry:
         )
 
 
-def lobe_width(sigma: float | None, lam: Reals) -> float:
+def lobe_width(sigma: float | None, lam: Real) -> float:
     """Return the standard deviation of the narrowest lobe, rad: of exp(−σ²k²Δ²), 1/(√2 σk)."""
     return 0.05 if sigma is None else 1.0 / (2**0.5 * sigma * float(wavenumber(lam[0])))
 
 
-def light_direction(geometry: MeasurementGeometry) -> Reals:
+def light_direction(geometry: MeasurementGeometry) -> Real:
     """Return the unit vector (3,) towards the lamp."""
     return in_plane(geometry, -geometry.light)
 
 
-def in_plane(geometry: MeasurementGeometry, angle: float) -> Reals:
+def in_plane(geometry: MeasurementGeometry, angle: float) -> Real:
     """Return the unit vector (3,) at an angle in the plane of incidence, + away from the lamp."""
     return polar(math.radians(-angle), math.radians(geometry.azimuth))
 
 
-def cone(geometry: MeasurementGeometry, angle: float, lobe: float) -> tuple[Reals, Reals]:
+def cone(geometry: MeasurementGeometry, angle: float, lobe: float) -> tuple[Real, Real]:
     """Return directions (m, 3) in a detector's cone and their solid angles (m,).
 
     Gauss and Legendre's nodes in the angle from the axis, even ones around it: the cone's edge is
@@ -122,7 +120,7 @@ def cone(geometry: MeasurementGeometry, angle: float, lobe: float) -> tuple[Real
     return directions, solid
 
 
-def across_plane(geometry: MeasurementGeometry) -> Reals:
+def across_plane(geometry: MeasurementGeometry) -> Real:
     """Return the unit vector (3,) normal to the plane of incidence: s."""
     phi = math.radians(geometry.azimuth)
     return np.array([-math.sin(phi), math.cos(phi), 0.0])

@@ -12,11 +12,10 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..limits import MOST_PIXELS
 from .lengths import LONGEST_HEIGHT, PixelSize, pixel_size_of
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Statistics of fields with more than LARGE pixels are summed over blocks of ROWS rows.
 LARGE, ROWS = 2**25, 256
@@ -49,7 +48,7 @@ class HeightField:
         formula. Any other patch limits the coherence width (`heights.coherence`).
     """
 
-    heights: FloatArray
+    heights: Real
     pixel_size: tuple[float, float]
     name: str = field(default="height field", kw_only=True)
     history: tuple[str, ...] = field(default=(), kw_only=True)
@@ -200,12 +199,12 @@ def check_pixel_count(ny: int, nx: int, name: str) -> None:
         )
 
 
-def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, float]:
+def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[Real, float]:
     """Check heights and copy them to a read-only C-ordered float64 array, unless they are one.
 
     Returns
     -------
-    FloatArray, float
+    Real, float
         The heights, and the constant offset that was subtracted from them, µm.
     """
     if np.ma.isMaskedArray(heights) and np.ma.is_masked(heights):
@@ -249,7 +248,7 @@ def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, flo
     return array, offset
 
 
-def blocks(heights: FloatArray, overlap: int = 0) -> Iterator[FloatArray]:
+def blocks(heights: Real, overlap: int = 0) -> Iterator[Real]:
     """Yield `ROWS` rows of large heights at a time, and `overlap` of the next ones; else all."""
     rows = len(heights) if heights.size <= LARGE else ROWS
     for start in range(0, len(heights), rows):

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from ..arrays import Real
 from ..errors import DiffractionError
-from .field import FloatArray, HeightField, blocks
+from .field import HeightField, blocks
 
 Size = tuple[float, float]
 Region = tuple[float, ...]  # (width, height), or (width, height, x, y), µm
@@ -81,7 +82,7 @@ def crop(field: HeightField, region: Region) -> HeightField:
     return field.changed(heights, line, cut_out=True, periodic=False) if line else field
 
 
-def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[FloatArray, str]:
+def fill_missing(heights: Real, method: str | None, name: str) -> tuple[Real, str]:
     """Replace NaN by heights interpolated or extended from the points around.
 
     Raises a DiffractionError if points are missing and `method` is `None`, or more than half of
@@ -99,7 +100,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
 
     Returns
     -------
-    FloatArray, str
+    Real, str
         The filled heights, and a line that says how many points were filled; "" if none were.
     """
     missing = np.isnan(heights)
@@ -125,7 +126,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
     return filled, f"{share} had no height and were filled, method {method}"
 
 
-def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
+def _harmonic(start: Real, missing: npt.NDArray[np.bool_]) -> Real:
     """Solve Laplace's equation on the missing points by conjugate gradients, from `start`.
 
     The five-point Laplacian with free edges is symmetric and, with a measured point anywhere,
@@ -165,7 +166,7 @@ def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
 
 
 def plane_of(
-    field: HeightField, tapers: tuple[FloatArray | None, FloatArray | None] = (None, None)
+    field: HeightField, tapers: tuple[Real | None, Real | None] = (None, None)
 ) -> tuple[float, float]:
     """Return the slopes (∂h/∂x, ∂h/∂y) of the least-squares plane.
 
@@ -204,7 +205,7 @@ def level_quadratic(field: HeightField) -> HeightField:
     return field.changed(heights, line)
 
 
-def arc_of(heights: FloatArray) -> FloatArray:
+def arc_of(heights: Real) -> Real:
     """Return the least-squares polynomial of degree 2, without its mean, (ny, nx)."""
     bases = []
     for count in heights.shape:
@@ -260,7 +261,7 @@ def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
     return field.changed(heights, line + rms_change(field, heights))
 
 
-def rms_change(field: HeightField, heights: FloatArray) -> str:
+def rms_change(field: HeightField, heights: Real) -> str:
     """Return the end of a history line: RMS change of height, a constant offset left out."""
     mean = float(heights.mean()) - float(field.heights.mean())
     pairs = zip(blocks(heights), blocks(field.heights), strict=True)
@@ -268,7 +269,7 @@ def rms_change(field: HeightField, heights: FloatArray) -> str:
     return f"; RMS change {math.sqrt(squares / heights.size):.3g} µm"
 
 
-def _without_plane(field: HeightField) -> tuple[FloatArray, str]:
+def _without_plane(field: HeightField) -> tuple[Real, str]:
     """Return heights without their least-squares plane, and its rise across the patch in words."""
     (x, y), (slope_x, slope_y) = _centred(field), plane_of(field)
     heights = field.heights - slope_x * x
@@ -278,7 +279,7 @@ def _without_plane(field: HeightField) -> tuple[FloatArray, str]:
     return heights, f"{rise_x:.3g} µm along x and {rise_y:.3g} µm along y"
 
 
-def _centred(field: HeightField) -> tuple[FloatArray, ...]:
+def _centred(field: HeightField) -> tuple[Real, ...]:
     """Return coordinates (nx,) and (ny,) of the samples, µm, 0 in the middle."""
     return tuple(
         (np.arange(count, dtype=np.float64) - (count - 1) / 2) * pixel

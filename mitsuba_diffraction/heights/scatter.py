@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from ..arrays import Real
 from ..errors import DiffractionError, warn
-from .field import FloatArray, HeightField
+from .field import HeightField
 from .spectra import frequencies, height_spectrum
 
 #: Rings of spatial frequency for each octave.
@@ -37,8 +38,8 @@ class PowerSpectrum(NamedTuple):
     band : shortest and longest spatial wavelength, µm.
     """
 
-    frequency: FloatArray
-    density: FloatArray
+    frequency: Real
+    density: Real
     modes: NDArray[np.int64]
     rms: float
     slope: float
@@ -130,7 +131,7 @@ def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg:
     weight = np.sqrt(spectrum.modes[used] / spectrum.modes[used].sum())
     brdf = 16.0 * np.pi**2 / lam**4 * spectrum.density[used]
 
-    def residuals(parameters: FloatArray) -> FloatArray:
+    def residuals(parameters: Real) -> Real:
         log_a, log_b, g = parameters
         return np.asarray(weight * (log_a - np.log(np.exp(log_b) + beta**g) - np.log(brdf)))
 

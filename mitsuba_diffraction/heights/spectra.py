@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from .field import FloatArray, HeightField
+from ..arrays import Real
+from .field import HeightField
 from .preprocess import arc_of
 
 #: Least ratio of a grating's peak to the median of all directions at its frequency, and to that of
@@ -49,14 +50,14 @@ _LOBE, _SPREAD, _FAN = 2, 0.12, math.radians(8)
 _LARGEST = 1024
 
 
-def frequencies(field: HeightField) -> tuple[FloatArray, FloatArray]:
+def frequencies(field: HeightField) -> tuple[Real, Real]:
     """Return the frequencies (nx,) along x and (ny, 1) along y of a spectrum of `field`, 1/µm."""
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
     fx, fy = np.fft.fftfreq(nx, dx), np.fft.fftfreq(ny, dy)
     return np.fft.fftshift(fx), np.fft.fftshift(fy)[:, None]
 
 
-def height_spectrum(field: HeightField, windowed: bool = True) -> FloatArray:
+def height_spectrum(field: HeightField, windowed: bool = True) -> Real:
     """Return the two-sided power spectral density of the heights, (ny, nx) in µm⁴.
 
     The integral over frequencies is the variance. A Hann window, normalised to mean square 1,
@@ -183,7 +184,7 @@ def examine_periods(field: HeightField, most: int = 3) -> Periods:
 class _Peak:
     """Peak of a spectrum; masks have the spectrum's shape."""
 
-    centre: FloatArray  # centre of mass (fx, fy), 1/µm
+    centre: Real  # centre of mass (fx, fy), 1/µm
     highest: tuple[int, int]  # row and column of the highest value
     near: npt.NDArray[np.bool_]  # bins of the peak
     line: npt.NDArray[np.bool_]  # bins of its direction, of all frequencies
@@ -271,20 +272,20 @@ class _Spectrum:
         return None
 
 
-def _central(heights: FloatArray) -> FloatArray:
+def _central(heights: Real) -> Real:
     """Return the central `_LARGEST` samples at most along both axes."""
     y, x = (max(n - _LARGEST, 0) // 2 for n in heights.shape)
     return heights[y : y + _LARGEST, x : x + _LARGEST]
 
 
-def _periodicity(frequency: FloatArray, share: float, repeats: float) -> Periodicity:
+def _periodicity(frequency: Real, share: float, repeats: float) -> Periodicity:
     """Convert a frequency (fx, fy) in 1/µm to a period and a direction."""
     direction = math.degrees(math.atan2(frequency[1], frequency[0]))
     direction -= 180.0 * math.ceil((direction - 90.5) / 180.0)  # the same grooves seen from x
     return Periodicity(float(1.0 / np.hypot(*frequency)), round(direction, 2) + 0.0, share, repeats)
 
 
-def order_powers(field: HeightField, wavelength: float) -> FloatArray:
+def order_powers(field: HeightField, wavelength: float) -> Real:
     """Return the share |a_j(κ)|² of the light in each order j, (ny, nx), at normal incidence.
 
     a_j(κ) = mean(exp(iκh)·exp(i q_j·x)) with κ = 4π/λ, `wavelength` λ in nm. Orders j > 0 are
@@ -296,11 +297,11 @@ def order_powers(field: HeightField, wavelength: float) -> FloatArray:
 
 
 def profile(
-    spectrum: FloatArray,
+    spectrum: Real,
     field: HeightField,
-    edges: FloatArray,
+    edges: Real,
     direction: Literal["all", "x", "y"] = "all",
-) -> FloatArray:
+) -> Real:
     """Average a spectrum (ny, nx) over rings of frequency between `edges` (n + 1,): shape (n,).
 
     With a `direction`, only frequencies that are at least twice as high along it as across it
@@ -319,7 +320,7 @@ def profile(
     return (total / count)[1:-1]
 
 
-def far_field(field: HeightField, wavelength: float, size: int = 201) -> FloatArray:
+def far_field(field: HeightField, wavelength: float, size: int = 201) -> Real:
     """Return the light of one wavelength over the hemisphere, per unit of (u, v).
 
     Light comes along the normal. Order j goes to (u, v) = λ·(fx, fy), the direction's sine along x

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .field import LARGE, FloatArray, HeightField, blocks
+from ..arrays import Real
+from .field import LARGE, HeightField, blocks
 from .preprocess import MAD_TO_SIGMA, level_plane, level_quadratic, plane_of, plane_rise
 from .spectra import seen_slope
 
@@ -250,7 +251,7 @@ def _dust(field: HeightField) -> str:
     )
 
 
-def _is_straight(lines: FloatArray) -> np.ndarray:
+def _is_straight(lines: Real) -> np.ndarray:
     """Whether each line is straight: levelling may have tilted it."""
     bends = np.diff(lines, n=2, axis=1)
     size = np.sqrt(np.mean(np.square(bends)))

@@ -28,11 +28,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Real
 from .arithmetic import Number, one_minus_exp
-
-Real = NDArray[np.float64]
 
 #: Frequencies within this part of an octave share a bin, at the mean frequency of their power.
 _BINS_PER_OCTAVE = 256

@@ -18,14 +18,14 @@ from __future__ import annotations
 from functools import reduce
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Real
 from ..errors import check_choice
 from .arithmetic import Number, of
 from .colour import encode_srgb, encoded_colour
 
 Colour = tuple[Number, Number, Number]
-Array = NDArray[np.float64]
 
 #: Ways to show linear light.
 VIEWS = ("natural", "standard")
@@ -69,7 +69,7 @@ _DARKEST = _GREY * 2.0**-_BELOW
 _MOST = 1e20
 
 
-def shown(linear: ArrayLike, view: str = "natural") -> Array:
+def shown(linear: ArrayLike, view: str = "natural") -> Real:
     """Encode linear sRGB (..., 3), where 1 is white, for a display: 0 to 1, sRGB's transfer curve.
 
     Raises a DiffractionError if `view` is not in `VIEWS`.
@@ -78,7 +78,7 @@ def shown(linear: ArrayLike, view: str = "natural") -> Array:
     return encode_srgb(linear if view == "standard" else natural(linear))
 
 
-def natural(linear: ArrayLike) -> Array:
+def natural(linear: ArrayLike) -> Real:
     """Return linear sRGB (..., 3), any values, within the display's range: 0 to 1, still linear."""
     light = np.asarray(linear, np.float64)
     return np.stack(natural_colour((light[..., 0], light[..., 1], light[..., 2])), axis=-1)
@@ -129,7 +129,7 @@ def display_curve(stops: Number) -> Number:
     return xp.clip(xp.where(dark, _PIVOT[1] - change, _PIVOT[1] + change), 0.0, 1.0)
 
 
-def _product(matrix: Array, colour: Colour) -> Colour:
+def _product(matrix: Real, colour: Colour) -> Colour:
     red, green, blue = (
         sum(float(m) * x for m, x in zip(row, colour, strict=True)) for row in matrix
     )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from .arithmetic import Number, of
-
-Array = NDArray[np.float64]
 
 #: A window of `coherence_width` spans four standard deviations of its amplitude.
 WIDTHS_PER_SIGMA = 4.0
@@ -40,12 +39,12 @@ def check_angles(theta: float, phi: float) -> None:
         raise DiffractionError(f"phi={phi:g} must be from -360 to 360 degrees")
 
 
-def wavenumber(wavelength: ArrayLike) -> Array:
+def wavenumber(wavelength: ArrayLike) -> Real:
     """k = 2π/λ in rad/µm, for a vacuum wavelength in nm."""
     return np.asarray(2e3 * np.pi / np.asarray(wavelength, np.float64), np.float64)
 
 
-def diffraction_coordinates(wi: ArrayLike, wo: ArrayLike) -> tuple[Array, Array, Array]:
+def diffraction_coordinates(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real, Real]:
     """(u, v, w) = ωi + ωo, each of shape (n,), for unit vectors of shape (n, 3).
 
     The spatial frequency that light of wavenumber k probes is k·(u, v), its phase per height k·w
@@ -55,7 +54,7 @@ def diffraction_coordinates(wi: ArrayLike, wo: ArrayLike) -> tuple[Array, Array,
     return total[..., 0], total[..., 1], total[..., 2]
 
 
-def kirchhoff_factor(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, sigma: float) -> Array:
+def kirchhoff_factor(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, sigma: float) -> Real:
     """f / (R ⟨|P|²⟩) = (1 + ωi·ωo)² / (λ² A w² cosθi cosθo) in 1/µm⁴, zero below the surface.
 
     λ in µm and A = πσ², the integral of the squared window: then a flat mirror's directional

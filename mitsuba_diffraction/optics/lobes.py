@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .blend import Real
+from ..arrays import Real
 
 #: A lobe exp(−|Δ|²/width²) ends here, in units of its width: exp(−3.5²) = 5e-6.
 LOBE_END = 3.5

@@ -32,9 +32,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Real
 from ..errors import DiffractionError, quoted
-
-Reals = NDArray[np.float64]
 
 #: Name of the perfect conductor, R = 1.
 PERFECT = "none"
@@ -66,8 +65,8 @@ class Tissue:
     """
 
     name: str
-    n: Callable[[Reals], Reals]
-    k: Callable[[Reals], Reals] | None = None
+    n: Callable[[Real], Real]
+    k: Callable[[Real], Real] | None = None
     first: float = 270.0
     last: float = 1200.0
 
@@ -82,19 +81,19 @@ class Tissue:
         return self.k is not None
 
     @property
-    def nodes(self) -> Reals:
+    def nodes(self) -> Real:
         """Wavelengths (n,), nm, between which the index is linear to 1e-4."""
         return np.arange(self.first, self.last + 1.0, 5.0)
 
 
-def _cauchy(a: float, b: float) -> Callable[[Reals], Reals]:
+def _cauchy(a: float, b: float) -> Callable[[Real], Real]:
     return lambda lam: a + b / lam**2
 
 
-def _sellmeier(*terms: tuple[float, float]) -> Callable[[Reals], Reals]:
+def _sellmeier(*terms: tuple[float, float]) -> Callable[[Real], Real]:
     """Return n² = 1 + Σ c λ²/(λ² − pole), λ in µm and poles in µm²."""
 
-    def n(lam: Reals) -> Reals:
+    def n(lam: Real) -> Real:
         square = np.square(1e-3 * lam)
         return np.sqrt(1.0 + sum(c * square / (square - pole) for c, pole in terms))
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arrays import Real
 from . import boundary, through
-from .blend import Real
 from .boundary import Direction, Heights, Jones
 from .coat import beneath_reflectance, crossing, refracted, transmitted
 from .fresnel import Filmed, reflectance

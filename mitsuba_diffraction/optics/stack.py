@@ -12,12 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Complex, Real
 from .arithmetic import Number
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Standard deviations of thickness that a mean covers, and its steps: of the phase, rad, at most.
 _REACH, _STEP, _FEWEST = 3.0, 1.0, 13

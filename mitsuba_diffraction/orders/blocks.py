@@ -20,10 +20,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..optics.coat import face_transmittance
 from ..optics.orders import port_power
 from . import cells
-from .cells import Array
 from .response import Band
 from .table import OrderTable
 
@@ -32,7 +32,7 @@ from .table import OrderTable
 _LEAST_WITHIN, _LEAST_ABOVE = 0.04, 0.05
 
 
-def factors(x: Array, y: Array, index: float) -> tuple[Array, NDArray[np.bool_]]:
+def factors(x: Real, y: Real, index: float) -> tuple[Real, NDArray[np.bool_]]:
     """Return factors between ports from e to η, (…, 2n, 2n), and whether both are known.
 
     Factors are 0 in order 0 of the reflection, and where a port has no light. Known ones are far
@@ -53,7 +53,7 @@ def factors(x: Array, y: Array, index: float) -> tuple[Array, NDArray[np.bool_]]
     return scale, far[..., :, None] & far[..., None, :] & (scale > 0.0)
 
 
-def reduced(table: OrderTable, band: Band, kind: int) -> Array:
+def reduced(table: OrderTable, band: Band, kind: int) -> Real:
     """Return the reduced efficiencies e (τ, ρ, w, j, q); 0 in order 0 of the reflection."""
     index = table.block
     assert index is not None
@@ -67,7 +67,7 @@ def reduced(table: OrderTable, band: Band, kind: int) -> Array:
     return divided(values, *factors(index * light.x, index * light.y, index))
 
 
-def divided(values: Array, scale: Array, known: NDArray[np.bool_]) -> Array:
+def divided(values: Real, scale: Real, known: NDArray[np.bool_]) -> Real:
     """Return ratios (a, b, c, …, n) of values at the nodes of a grid to factors (a, b, c, …).
 
     known : (a, b, c, …) whether ratios are known; elsewhere they are the nearest node's, 0 without

@@ -36,16 +36,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ..arrays import Real, Whole
 from ..optics.orders import (
     cell_wavelengths,
     order_cell,
     wavelength_coordinate,
 )
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 #: Kinds, as numbers: that of the channel count band + 1, and that of the channel count band.
 A, B = 0, 1
@@ -79,9 +77,9 @@ class Cell(NamedTuple):
     band: Whole
     kind: Whole
     channel: Whole
-    tau: Array
-    rho: Array
-    k_continuous: Array
+    tau: Real
+    rho: Real
+    k_continuous: Real
 
     @property
     def channels(self) -> Whole:
@@ -98,9 +96,9 @@ class Conditions(NamedTuple):
     wavelength : in vacuum, nm.
     """
 
-    x: Array
-    y: Array
-    wavelength: Array
+    x: Real
+    y: Real
+    wavelength: Real
 
 
 def to_cell(x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, optical_period: float) -> Cell:
@@ -153,7 +151,7 @@ def wavelength_of(
     wavelengths: tuple[float, float],
     optical_period: float,
     least_c: float = 0.0,
-) -> Array:
+) -> Real:
     """Return the wavelength in vacuum, nm, at w (0 to 1) for K; see the module.
 
     least_c : least c of the light, at which w = 0 if the table has shorter wavelengths.
@@ -167,7 +165,7 @@ def w_of(
     wavelength: ArrayLike,
     wavelengths: tuple[float, float],
     optical_period: float,
-) -> Array:
+) -> Real:
     """Return w of a wavelength in vacuum (nm); wavelengths outside the table get 0 or 1."""
     low, high = _ends(k_continuous, wavelengths, optical_period)
     lam = np.asarray(wavelength, np.float64)
@@ -184,24 +182,24 @@ def reversed_ports(ports: int, sides: int) -> Whole:
     return np.asarray(np.flip(np.arange(ports).reshape(sides, -1), 1).ravel())
 
 
-def nodes(count: int) -> Array:
+def nodes(count: int) -> Real:
     """Return the Chebyshev nodes between 0 and 1 (roots of T_count), ascending."""
     angles = np.pi * (np.arange(count) + 0.5) / count
     return np.asarray(0.5 - 0.5 * np.cos(angles))
 
 
-def even_nodes(count: int) -> Array:
+def even_nodes(count: int) -> Real:
     """Return even nodes from 0 to 1: twice as many cells have them, too."""
     return np.linspace(0.0, 1.0, count)
 
 
-def linear(count: int, at: ArrayLike) -> Array:
+def linear(count: int, at: ArrayLike) -> Real:
     """Return the matrix that takes values at `even_nodes(count)` to values between, (n, count)."""
     places = np.asarray(at, np.float64)[..., None] * (count - 1)
     return np.maximum(1.0 - np.abs(places - np.arange(count)), 0.0)
 
 
-def interpolation(count: int, at: ArrayLike) -> Array:
+def interpolation(count: int, at: ArrayLike) -> Real:
     """Return the matrix that takes values at `nodes(count)` to a polynomial's values, (n, count).
 
     Barycentric form of the first kind's nodes (Berrut and Trefethen 2004, eq. 4.2 and 5.3).
@@ -215,12 +213,12 @@ def interpolation(count: int, at: ArrayLike) -> Array:
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
 
 
-def sine_squared(tau: ArrayLike) -> Array:
+def sine_squared(tau: ArrayLike) -> Real:
     """Return t = sin²(πτ/2)."""
     return np.asarray(np.sin(0.5 * np.pi * np.asarray(tau, np.float64)) ** 2)
 
 
-def _tau(t: Array) -> Array:
+def _tau(t: Real) -> Real:
     """Return τ of t = sin²(πτ/2), as exact as `optics.orders.smooth_coordinate` is fast."""
     return np.asarray(np.arcsin(np.sqrt(np.clip(t, 0.0, 1.0))) * (2.0 / np.pi))
 
@@ -230,7 +228,7 @@ def _ends(
     wavelengths: tuple[float, float],
     optical_period: float,
     least_c: float = 0.0,
-) -> tuple[Array, Array]:
+) -> tuple[Real, Real]:
     """Return the ends of w, nm; least_c : least c of the light."""
     big_k = np.maximum(np.asarray(k_continuous, np.float64), _MIN_WIDTH)
     return cell_wavelengths(2e3 * optical_period / big_k, *wavelengths, least_c)

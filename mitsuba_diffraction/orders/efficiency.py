@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Real
 from ..errors import DiffractionError, warn
 from ..reference.boundary import mueller as mueller_matrices
 from ..reference.boundary import polarisation_axes, turn
-from .cells import Array
 from .grid import OrderGrid, grid_of
 from .listed import listed_jones
 from .listed_lookup import ListedLookup
@@ -45,7 +45,7 @@ def efficiency(
     *,
     from_below: bool = False,
     transmitted: bool = False,
-) -> Array:
+) -> Real:
     """Return the efficiency of an order for unpolarised light, as the renderer interpolates it.
 
     Raises a DiffractionError if light below is asked for, and the table is of reflected light.
@@ -71,7 +71,7 @@ def efficiency(
     return share.efficiency.reshape(placed.shape)
 
 
-def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
+def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
     """Return the efficiencies for incident light of s and of p polarisation, (…, 2).
 
     s light has its E across the plane of incidence. Other arguments as for `efficiency`.
@@ -97,7 +97,7 @@ def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array
     return np.stack([mean + difference, mean - difference], axis=-1)
 
 
-def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Array:
+def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
     """Return the efficiencies of light whose E, or B, lies along the grooves, (…, 2).
 
     As far as it can: see the axes of `polarised`. In the plane across the grooves they are s and p
@@ -122,7 +122,7 @@ def _turned(light: _Light) -> TurnedAxes:
     return turned_axes(np.asarray(light.x, np.float64), np.asarray(light.y, np.float64))
 
 
-def _linear(light: _Light) -> tuple[Array, Array, Array | None]:
+def _linear(light: _Light) -> tuple[Real, Real, Real | None]:
     """Return M₀₀, M₀₁ and M₀₂ of an order; None for the last one where it is not known."""
     if light.table.response.elements == UNPOLARISED:
         raise DiffractionError(
@@ -132,7 +132,7 @@ def _linear(light: _Light) -> tuple[Array, Array, Array | None]:
     return parts[0], parts[1], parts[2] if len(parts) > ALONG else None
 
 
-def mueller(table: OrderTable, *light: Any) -> Array:
+def mueller(table: OrderTable, *light: Any) -> Real:
     """Return the Mueller matrices of an order, (…, 4, 4), about the axes of `polarised`.
 
     M₀₀ is `efficiency`. Arguments as for `efficiency`.
@@ -208,11 +208,11 @@ class _Placed(NamedTuple):
     order: Any
     active: NDArray[np.bool_]
     below: NDArray[np.bool_] | None
-    y: Array
+    y: Real
     shape: tuple[int, ...]
 
 
-def _elements(light: _Light) -> Array:
+def _elements(light: _Light) -> Real:
     """Return the first elements of the Mueller matrices of an order, (…, n)."""
     placed = _placed(light)
     elements = placed.lookup.elements(
@@ -274,7 +274,7 @@ def lookup_of(table: OrderTable) -> Lookup:
     return _lookups[table]
 
 
-def _lit(table: OrderTable, wavelength: Array) -> NDArray[np.bool_]:
+def _lit(table: OrderTable, wavelength: Real) -> NDArray[np.bool_]:
     """Whether wavelengths are close enough to the table's; warn of the others."""
     least, most = table.reach
     lit = (wavelength >= least) & (wavelength <= most)

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..optics.orders import crossed_square, order_factor
 from . import blocks
-from .cells import Array, Counts
+from .cells import Counts
 from .listed import mirror_of
 from .polarised import MIN_ANGLE, TurnedAxes, about_s, smooth_elements, turned_axes
 from .response import MUELLER, ListedResponse
@@ -81,9 +82,9 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
     if table.block:
         counts = Counts(*(n - 1 for n in table.bands[0].counts))
 
-    at_nodes: list[Array] = []
+    at_nodes: list[Real] = []
 
-    def records(of: Kind) -> Array:
+    def records(of: Kind) -> Real:
         if table.block:
             return corner_records(blocks.reduced(table, table.bands[of.band], of.kind))
         of_kind = rows(table, of, counts, coated=coated)
@@ -92,7 +93,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
         at_nodes.append(np.pad(parts[-1], [(0, 0)] * 4 + [(0, missing)]).reshape(-1, 8))
         return np.concatenate([corner_records(part) for part in parts], axis=-1)
 
-    def nodes(of: Kind) -> Array:
+    def nodes(of: Kind) -> Real:
         values = table.bands[of.band].kind(of.kind).astype(np.float64)
         if values.shape[-1] == MUELLER:
             values = smooth_elements(table, of.band, values)
@@ -125,7 +126,7 @@ def _listed(table: OrderTable, response: ListedResponse, elements: bool) -> Orde
     return _scaled(counts, starts, records, matrices, starts)
 
 
-def _without_anomalies(table: OrderTable, response: ListedResponse) -> Array:
+def _without_anomalies(table: OrderTable, response: ListedResponse) -> Real:
     """Return a crossed grating's elements over their factors, as `ListedResponse.values`.
 
     For incident light about s, which goes round with φ; along the normal each φ has its own.
@@ -146,7 +147,7 @@ def _without_anomalies(table: OrderTable, response: ListedResponse) -> Array:
 
 
 def _scaled(
-    counts: Counts, starts: NDArray[np.uint32], corners: Array, elements: Array | None,
+    counts: Counts, starts: NDArray[np.uint32], corners: Real, elements: Real | None,
     element_starts: NDArray[np.uint32],
 ) -> OrderGrid:  # fmt: skip
     scale = half_scale(corners)
@@ -161,7 +162,7 @@ def half_scale(values: NDArray[Any]) -> float:
     return float(2.0 ** math.ceil(math.log2(max(float(values.max()), 1e-30) / _LARGEST)))
 
 
-def corner_records(values: Array) -> Array:
+def corner_records(values: Real) -> Real:
     """Return efficiencies (…, ports), then their sum, at the corners of all cells, (n, 8).
 
     CellResponse lie along the first three axes; corners are 000, 001, 010 … 111.
@@ -171,7 +172,7 @@ def corner_records(values: Array) -> Array:
     return np.stack([whole[pair] for pair in pairs], axis=-1).reshape(-1, 8)
 
 
-def _joined(parts: list[Array]) -> tuple[NDArray[np.uint32], Array]:
+def _joined(parts: list[Real]) -> tuple[NDArray[np.uint32], Real]:
     """Return the first record of each kind of each band, and all records of the kinds."""
     parts[1:1] = [parts[0][:0]]  # kind B of band 0 has none
     starts = np.cumsum([0, *map(len, parts[:-1])])

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
-from .cells import Array
 from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
 from .polarised import MIN_ANGLE, turned_axes
@@ -73,13 +73,13 @@ def imported_table(
     return replace(table, header=header)
 
 
-def _placed(theta: Array, phi: Array, crossed: bool) -> tuple[Array, Array]:
+def _placed(theta: Real, phi: Real, crossed: bool) -> tuple[Real, Real]:
     """Return the mirror direction of light; of grooves the image with y at least 0."""
     x, y = mirror_of(theta, phi)
     return x, y if crossed else np.abs(y)
 
 
-def _elements(values: Array, grid: Efficiencies, crossed: bool) -> Array:
+def _elements(values: Real, grid: Efficiencies, crossed: bool) -> Real:
     """Return elements (a, b, c, 1, sides, m, 3) of efficiencies (a, b, c, m, 2 or 4)."""
     sides = np.stack(np.split(values, values.shape[-1] // 2, axis=-1), axis=3)
     mean, half = sides.mean(axis=-1), 0.5 * (sides[..., 0] - sides[..., 1])
@@ -140,7 +140,7 @@ def _check_orders(
     x, y = _placed(theta, phi, crossed)
     steps = [1e-3 * lam / (superstrate * period) for period in periods]
 
-    def square(some: NDArray[np.int64]) -> Array:
+    def square(some: NDArray[np.int64]) -> Real:
         """Return squared cosines (lights, orders)."""
         shifts = (part * step[:, None] for part, step in zip(some.T, steps, strict=True))
         return np.asarray(crossed_square(x[:, None], y[:, None], *shifts))
@@ -181,7 +181,7 @@ def _shown(order: NDArray[np.int64], crossed: bool) -> str:
 
 
 def _errors(
-    table: OrderTable, grid: Efficiencies, orders: NDArray[np.int64], values: Array
+    table: OrderTable, grid: Efficiencies, orders: NDArray[np.int64], values: Real
 ) -> dict[str, Any]:
     """Compare a table with its list, per order and polarisation, and light with reversed light.
 

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
+from ..arrays import Complex, Real
 from ..errors import warn
-from .cells import Array
 from .polarised import nearest_jones
 from .response import ListedResponse, orders_between
 from .table import OrderTable
-
-Complex = NDArray[np.complex128]
 
 #: Decimals of degrees that tell directions apart.
 _DIGITS = 9
@@ -39,15 +37,15 @@ class Lights(NamedTuple):
         positive number: their phases are stored; None where phases are not known.
     """
 
-    wavelengths: Array
-    theta: Array
-    phi: Array
+    wavelengths: Real
+    theta: Real
+    phi: Real
     orders: NDArray[np.int64]
-    values: Array
+    values: Real
     jones: Complex | None = None
 
 
-def mirror_of(theta: ArrayLike, phi: ArrayLike) -> tuple[Array, Array]:
+def mirror_of(theta: ArrayLike, phi: ArrayLike) -> tuple[Real, Real]:
     """Return x and y of the mirror direction of light from θ and φ, degrees."""
     sine, turn = np.sin(np.radians(theta)), np.radians(phi)
     return np.asarray(-sine * np.cos(turn)), np.asarray(-sine * np.sin(turn))
@@ -170,7 +168,7 @@ def listed_jones(table: OrderTable, *light: ArrayLike) -> Complex:
     return entries.reshape(*x.shape, 2, 2)
 
 
-def _canonical(lights: Lights, crossed: bool) -> tuple[Array, Array]:
+def _canonical(lights: Lights, crossed: bool) -> tuple[Real, Real]:
     """Return θ from 0 and φ (b, c), degrees: φ to 180 on grooves, below 360 on crossed gratings."""
     theta, azimuth = np.meshgrid(lights.theta, lights.phi, indexing="ij")
     turned = (azimuth + np.where(theta < 0.0, 180.0, 0.0)) % 360.0
@@ -181,8 +179,8 @@ def _canonical(lights: Lights, crossed: bool) -> tuple[Array, Array]:
 
 
 def _of_nearest_directions(
-    values: Array, known: NDArray[np.bool_], polar: Array, azimuths: Array
-) -> Array:
+    values: Real, known: NDArray[np.bool_], polar: Real, azimuths: Real
+) -> Real:
     """Give nodes (θ, φ) that the list lacks the light of the nearest direction in it."""
     if known.all():
         return values
@@ -195,9 +193,9 @@ def _of_nearest_directions(
 
 
 def _filled(
-    values: Array, axes: tuple[Array, Array, Array], orders: NDArray[np.int64],
+    values: Real, axes: tuple[Real, Real, Real], orders: NDArray[np.int64],
     steps: list[float], index: float,
-) -> Array:  # fmt: skip
+) -> Real:  # fmt: skip
     """Give orders (λ, θ, φ, m, n) that do not propagate their nearest light in which they do.
 
     Interpolation between the two sides of a Rayleigh anomaly would halve the light on one side.

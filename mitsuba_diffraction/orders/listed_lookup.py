@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import Real
 from ..optics.arithmetic import Mask, Number, of
 from ..optics.orders import crossed_square, order_factor
-from .cells import Array
 from .grid import OrderGrid
 from .lookup import Index, Lookup, Memory, Share, corner_weights
 from .polarised import ODD, about_s, turned_axes
@@ -178,7 +178,7 @@ class ListedLookup(Lookup):
 class _Axis:
     """Ascending nodes, and the place of a value among them, from 0 to 1."""
 
-    def __init__(self, nodes: Array) -> None:
+    def __init__(self, nodes: Real) -> None:
         self._nodes = nodes
         steps = np.diff(nodes)
         self._even = len(nodes) < 3 or np.ptp(steps) <= 1e-6 * steps.max()

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.io import netcdf_file
 
+from ..arrays import Real
 from ..atomic import atomic_path
 from ..columns import save_numbers
 from ..errors import DiffractionError
 from ..optics.orders import crossed_square
-from .cells import Array as Real
 from .efficiency import jones_matrices
 from .file import add_variable
 from .listed import mirror_of

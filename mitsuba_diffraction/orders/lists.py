@@ -30,12 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
+from ..arrays import Real
 from ..columns import read_columns
 from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
 from ..files import FileKind, beginning, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES, bounded_memory, check_content
-from .cells import Array as Real
 from .response import LARGEST_SUM
 from .table import WAVELENGTHS
 

@@ -19,11 +19,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..optics.arithmetic import Number, of, squared
 from ..optics.boundary import Jones
 from ..reference.boundary import mueller
 from . import cells
-from .cells import Array
 from .response import CellResponse
 from .table import OrderTable
 
@@ -71,12 +71,12 @@ def about_s(elements: Sequence[Number], axes: TurnedAxes, sign: float = 1.0) -> 
     return turned
 
 
-def mueller_of(amplitudes: NDArray[np.complex128]) -> Array:
+def mueller_of(amplitudes: NDArray[np.complex128]) -> Real:
     """Return the Mueller matrices (…, j, q, 4, 4) of a solver's amplitudes (…, j, 2, q, 2)."""
     return mueller(np.moveaxis(amplitudes, -3, -1))
 
 
-def smooth_elements(table: OrderTable, k: int, values: Array) -> Array:
+def smooth_elements(table: OrderTable, k: int, values: Real) -> Real:
     """Return elements (τ, ρ, w, j, q, 16) at nodes of a band, the odd ones over y."""
     assert isinstance(table.response, CellResponse)
     _, rho, w = table.response.nodes(k)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from . import cells
-from .cells import Array, B, Counts
+from .cells import B, Counts
 
 #: Sum over all orders that a table may have: 1, but for a solver's error.
 LARGEST_SUM = 1.001
@@ -83,7 +84,7 @@ class CellResponse:
         """All numbers."""
         return [kind for band in self.bands for kind in band.kinds]
 
-    def nodes(self, k: int) -> tuple[Array, Array, Array]:
+    def nodes(self, k: int) -> tuple[Real, Real, Real]:
         """Return the nodes τ, ρ and w of a band."""
         along = cells.even_nodes if self.even else cells.nodes
         tau, rho, w = map(along, self.bands[k].counts)
@@ -136,7 +137,7 @@ class ListedResponse:
         NaN where the light was not solved, or the order does not propagate. None: not known.
     """
 
-    axes: tuple[Array, Array, Array]
+    axes: tuple[Real, Real, Real]
     orders: NDArray[np.int64]
     values: NDArray[np.float32]
     in_plane: bool = False

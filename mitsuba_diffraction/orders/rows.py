@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..optics.coat import face_transmittance
 from ..optics.orders import least_c
 from . import cells
-from .cells import Array, Counts
+from .cells import Counts
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
@@ -43,8 +44,8 @@ class Rows(NamedTuple):
     through : under a coat the same times T/√N towards q.
     """
 
-    within: Array
-    through: Array
+    within: Real
+    through: Real
 
 
 class Kind(NamedTuple):
@@ -106,7 +107,7 @@ def kept(table: OrderTable) -> float:
 
 def resampled(
     table: OrderTable, k: int, values: NDArray[Any], counts: Counts, coated: bool
-) -> Array:
+) -> Real:
     """Interpolate values (τ, ρ, w, …) at nodes of a band to a grid with so many cells."""
     assert isinstance(table.response, CellResponse)
     matrix = cells.linear if table.response.even else cells.interpolation
@@ -118,7 +119,7 @@ def resampled(
     return np.asarray(np.einsum("rwc,trc...->trw...", along_w, summed, optimize=True), np.float64)
 
 
-def clamped(values: Array) -> Array:
+def clamped(values: Real) -> Real:
     """Clamp efficiencies (…, q) to at least 0, and their sums over q to at most 1."""
     positive = np.maximum(values, 0.0)
     total = positive.sum(axis=-1, keepdims=True)
@@ -128,10 +129,10 @@ def clamped(values: Array) -> Array:
 class _Grid(NamedTuple):
     """Even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), vacuum, nm."""
 
-    tau: Array
-    rho: Array
-    big_k: Array
-    wavelength: Array
+    tau: Real
+    rho: Real
+    big_k: Real
+    wavelength: Real
 
 
 def _grid(table: OrderTable, k: int, counts: Counts, coated: bool) -> _Grid:
@@ -140,7 +141,7 @@ def _grid(table: OrderTable, k: int, counts: Counts, coated: bool) -> _Grid:
     return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w, coated=coated))
 
 
-def wavelength_of(table: OrderTable, big_k: Array, w: Array, *, coated: bool = True) -> Array:
+def wavelength_of(table: OrderTable, big_k: Real, w: Real, *, coated: bool = True) -> Real:
     """Return the wavelength (vacuum, nm) at w of the even grids.
 
     coated : whether they have the light from outside of the coat alone.
@@ -149,7 +150,7 @@ def wavelength_of(table: OrderTable, big_k: Array, w: Array, *, coated: bool = T
     return cells.wavelength_of(big_k, w, table.wavelengths, period, least)
 
 
-def leaving_transmittance(squared_sine: Array, index: float) -> Array:
+def leaving_transmittance(squared_sine: Real, index: float) -> Real:
     """Return the unpolarised transmittance of a coat's face for light within; 0 if all returns.
 
     squared_sine : of the angle within the coat.

@@ -13,9 +13,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from . import cells
-from .cells import Array, largest_band
+from .cells import largest_band
 from .response import MUELLER, Band, CellResponse, ListedResponse
 
 #: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
@@ -69,10 +70,10 @@ class OrderTable:
     plugin: ClassVar[str] = "diffraction_orders"  #: BSDF of the table
 
     # Set by the package, since look-ups and files build on this class
-    efficiency: ClassVar[Callable[..., Array]]  #: of an order: `efficiency.efficiency`
-    polarised_efficiency: ClassVar[Callable[..., Array]]  #: `efficiency.polarised_efficiency`
-    groove_efficiency: ClassVar[Callable[..., Array]]  #: `efficiency.groove_efficiency`
-    mueller: ClassVar[Callable[..., Array]]  #: matrices of an order: `efficiency.mueller`
+    efficiency: ClassVar[Callable[..., Real]]  #: of an order: `efficiency.efficiency`
+    polarised_efficiency: ClassVar[Callable[..., Real]]  #: `efficiency.polarised_efficiency`
+    groove_efficiency: ClassVar[Callable[..., Real]]  #: `efficiency.groove_efficiency`
+    mueller: ClassVar[Callable[..., Real]]  #: matrices of an order: `efficiency.mueller`
     jones: ClassVar[Callable[..., Any]]  #: Jones matrices of an order: `efficiency.jones`
     load: ClassVar[Callable[..., OrderTable]]  #: from a file: `file.load_orders`
     save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`

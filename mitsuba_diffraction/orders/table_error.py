@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import Array
+from ..arrays import Real
 
 
 class TableError(NamedTuple):
@@ -37,7 +37,7 @@ class TableError(NamedTuple):
 
 
 def table_error(
-    found: Array, truth: Array, coloured: NDArray[np.bool_], least: float,
+    found: Real, truth: Real, coloured: NDArray[np.bool_], least: float,
     place: Callable[[int, int, int], str],
 ) -> TableError:  # fmt: skip
     """Compare efficiencies (lights, orders, polarisations) of a table with known ones.
@@ -63,7 +63,7 @@ def table_error(
     )
 
 
-def unpolarised(found: Array, truth: Array, coloured: NDArray[np.bool_]) -> tuple[Array, Array]:
+def unpolarised(found: Real, truth: Real, coloured: NDArray[np.bool_]) -> tuple[Real, Real]:
     """Return missed and all light (lights,) of coloured orders; arguments as of `table_error`."""
     missed = np.abs(found.mean(axis=-1) - truth.mean(axis=-1))
     return (missed * coloured).sum(axis=-1), (truth.mean(axis=-1) * coloured).sum(axis=-1)

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Single
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..tables.directional import LAST_ANGLE, SHARE, DirectionalTable
@@ -18,8 +19,6 @@ from .directions import Site
 from .energy_factors import ScaleRange
 from .memory import index_between, read_record, upload
 from .types import Buffer, Float, Index, Interaction, Vector2f, Vector3f
-
-Array = NDArray[np.float32]
 
 #: First wavelength, end and step of integrals over daylight, nm.
 _DAYLIGHT = (360.0, 830.0, 2.0)
@@ -175,7 +174,7 @@ def between(
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
-def _cells(table: DirectionalTable, stretch: float) -> Array:
+def _cells(table: DirectionalTable, stretch: float) -> Single:
     """Values at the corners of each cell, (rows, columns, channels, 4).
 
     Spectra have intervals of wavelengths instead of channels, and 8 values: of both ends.

@@ -10,8 +10,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from ..arrays import Complex, Real
 from ..errors import DiffractionError, check_keys, quoted
 from ..files import read_toml
 from ..heights.lengths import count_between, number_between
@@ -24,9 +24,6 @@ from .description import Feature
 from .materials import Material
 from .memory import read_record, upload
 from .types import Float, Interaction, Mask, Number
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Longest path there and back, 2 Σ n d, nm.
 MOST_PATH = 24e3

@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from ..arrays import Complex, Real
 
 # sinθ below which a direction is the normal itself: its azimuth is rounding
 _NORMAL = 1e-12

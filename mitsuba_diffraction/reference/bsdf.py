@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Complex, Real
 from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
@@ -23,7 +24,6 @@ from . import boundary
 from . import coat as coats
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
-from .boundary import Complex, Real
 from .integral import window_powers
 from .mirror import horizon_correction, interfering
 from .model import Light

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Complex, Real
 from ..optics.geometry import wavenumber
 from . import model
-from .boundary import Complex, Real
 from .fresnel import amplitudes
 from .mirror import horizon_correction, interfering, mirror_cosine
 from .model import Light

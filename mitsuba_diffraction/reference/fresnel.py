@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Complex, Real
 from ..optics.fresnel import Filmed, Index
-from .boundary import Complex, Real
 
 
 @dataclass(frozen=True)

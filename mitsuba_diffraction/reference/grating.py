@@ -17,10 +17,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from .arguments import directions_of
-from .boundary import Real
 from .fresnel import reflectance
 from .mirror import horizon_correction
 

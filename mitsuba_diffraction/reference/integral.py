@@ -17,8 +17,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Complex, Real
 from ..heights.field import HeightField
-from .boundary import Complex, Real
 from .model import Light, ensemble_power, window_sums
 from .screens import Orders, Sigmas, Sums, orders_near
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Real
 from ..optics import mirror
 from ..optics.geometry import wavenumber
-from .boundary import Real
 
 # Nodes of X up to _REACH, beyond which C is 1; steps of the iteration
 _NODES, _REACH, _STEPS = 600, 8.0, 200

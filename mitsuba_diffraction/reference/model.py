@@ -38,10 +38,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Complex, Real
 from ..heights.field import HeightField
 from ..optics.blend import ScaleRoughness
 from ..optics.fresnel import Filmed, Index
-from .boundary import Complex, Real, facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
+from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
 from .fresnel import amplitudes, faces, reflectance
 from .mirror import horizon_correction, mirror_cosine
 from .screens import Orders, Sigmas, Sums, patch_power, sharpened

@@ -24,10 +24,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Complex, Real
 from ..heights.coherence import window_corners, window_places
 from ..heights.field import HeightField
 from ..heights.preprocess import plane_of
-from .boundary import Complex, Real
 
 #: σ_l over σ.
 LOOKUP = 1.65

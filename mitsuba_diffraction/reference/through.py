@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .boundary import Complex, Real, facet_axis, jones_matrix, polarisation_axes, turn
+from ..arrays import Complex, Real
+from .boundary import facet_axis, jones_matrix, polarisation_axes, turn
 from .fresnel import amplitudes, decaying_root
 
 

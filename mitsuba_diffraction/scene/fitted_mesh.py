@@ -6,17 +6,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from ..arrays import Real
 from ..errors import DiffractionError, check_choice
 from .orientation.directions import direction_field
 from .orientation.interchange import stated_up
 from .orientation.mesh_files import load_mesh, load_orientation
 from .orientation.tangents import check_tangents
 from .orientation.trimesh import TriangleMesh, oriented_mesh
-
-Floats = NDArray[np.float64]
 
 #: Values of `up`: the axis of the file that points upwards on the stage.
 UPS = ("auto", "x", "y", "z", "-x", "-y", "-z")
@@ -47,10 +45,10 @@ class MeshPlacement(NamedTuple):
     """
 
     up: str
-    rotation: Floats
+    rotation: Real
     scale: float
-    shift: Floats
-    size: Floats
+    shift: Real
+    size: Real
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers, for printing."""
@@ -61,7 +59,7 @@ class MeshPlacement(NamedTuple):
         }
 
 
-def fit_of(positions: Floats, file: Path, up: str = "auto") -> MeshPlacement:
+def fit_of(positions: Real, file: Path, up: str = "auto") -> MeshPlacement:
     """Compute how a mesh is put on the stage.
 
     Raises a DiffractionError if `up` is not one of these, a vertex is not finite, or the mesh has
@@ -121,7 +119,7 @@ def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMe
     return oriented_mesh(positions, normals, faces, field.directions, uv)
 
 
-def framing(positions: Floats, camera: Floats, tangents: tuple[float, float]) -> Floats:
+def framing(positions: Real, camera: Real, tangents: tuple[float, float]) -> Real:
     """Return where a camera sees all vertices as large as possible, its direction unchanged.
 
     Parameters
@@ -143,7 +141,7 @@ def framing(positions: Floats, camera: Floats, tangents: tuple[float, float]) ->
     return np.asarray(camera @ [*(upper - lower) / 2.0, depth])
 
 
-def turned_around(positions: Floats) -> Floats:
+def turned_around(positions: Real) -> Real:
     """Return vertices (m, 3) of the solid that a mesh sweeps when it turns around the z axis."""
     radius, z = np.hypot(positions[:, 0], positions[:, 1]), positions[:, 2]
     layer = np.floor(63.999 * (z - z.min()) / max(float(np.ptp(z)), 1e-12)).astype(np.intp)
@@ -157,7 +155,7 @@ def turned_around(positions: Floats) -> Floats:
     return np.column_stack([rings.reshape(-1, 2), ends.repeat(_AZIMUTHS)])
 
 
-def _upright(up: str) -> Floats:
+def _upright(up: str) -> Real:
     """Return the rotation (3, 3) that turns an axis of the file to z."""
     axis = {"x": 0, "y": 1, "z": 2}[up[-1]]
     rotation = np.roll(np.eye(3), axis - 2, axis=0)
@@ -168,7 +166,7 @@ def _upright(up: str) -> Floats:
     return rotation
 
 
-def _guessed_up(positions: Floats, file: Path) -> str:
+def _guessed_up(positions: Real, file: Path) -> str:
     """Return y or z: the convention of the format, unless the mesh stands better on the other.
 
     Blender, scanners and CAD write PLY with z up; OBJ has y up in most programs. glTF and USD state
@@ -181,7 +179,7 @@ def _guessed_up(positions: Floats, file: Path) -> str:
     return other if areas[other] > _CLEARLY * areas[usual] else usual
 
 
-def _resting_area(positions: Floats) -> float:
+def _resting_area(positions: Real) -> float:
     """Area of the convex hull of the feet, as a share of the bounding box seen from above."""
     low, sides = positions.min(axis=0), np.ptp(positions, axis=0)
     feet = positions[positions[:, 2] <= low[2] + _FEET * sides[2], :2]

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from ..arrays import Single
 from ..atomic import atomic_path
 from ..errors import DiffractionError, quoted
 from ..images import read_picture
 from ..tables.exr import write_channels
 
-Floats = NDArray[np.float32]
 #: Quantity of the dots: of each label, from black to white, at each dot, or of all.
 Values = Mapping[int, float] | tuple[float, float] | NDArray[np.floating[Any]] | float
 
@@ -58,9 +58,9 @@ class Hologram:
     period : period of the patch, µm, for which lateral_scale is 1.
     """
 
-    orientation: Floats
-    lateral_scale: Floats
-    weight: Floats
+    orientation: Single
+    lateral_scale: Single
+    weight: Single
     period: float
 
     def parameters(self) -> dict[str, Any]:
@@ -234,11 +234,11 @@ def _disc(texels: int, dots: int) -> NDArray[np.bool_]:
     return np.hypot(*np.meshgrid(offset, offset)) <= 0.5 if texels > 1 else np.ones((1, 1), bool)
 
 
-def _enlarged(values: NDArray[np.float64], texels: int) -> Floats:
+def _enlarged(values: NDArray[np.float64], texels: int) -> Single:
     return values.repeat(texels, axis=0).repeat(texels, axis=1).astype(np.float32)
 
 
-def _texture(values: Floats) -> dict[str, Any]:
+def _texture(values: Single) -> dict[str, Any]:
     """Return a bitmap without interpolation: a mean of two gratings would be a wrong grating."""
     from ..plugin.memory import tensor
 

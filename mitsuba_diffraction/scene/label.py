@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from ..arrays import Real
 from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..plugin.presets import PATCHES
@@ -21,8 +21,6 @@ from .hologram import Files
 from .logo import HUES, Areas, logo, wavelengths_of
 from .orientation.mesh_files import load_mesh
 from .stage import STUDIO
-
-Floats = NDArray[np.float64]
 
 #: Length of the tangential part of ω_i + ω_o: periods of 1.0 to 1.4 µm are blue to red.
 TANGENTIAL = 0.448
@@ -59,9 +57,9 @@ class LabelPlace(NamedTuple):
     cut : whether the texture coordinates leave the label within it, as at a seam.
     """
 
-    matrix: Floats
+    matrix: Real
     size: tuple[float, float]
-    elevations: Floats
+    elevations: Real
     cut: bool = False
 
 
@@ -136,7 +134,7 @@ def front(
 
 
 def _place(
-    corners: Floats, normals: Floats, uv: Floats, wide: float, z: float, aspect: float
+    corners: Real, normals: Real, uv: Real, wide: float, z: float, aspect: float
 ) -> LabelPlace:
     """Return the place of a label on the side that looks to −y.
 
@@ -148,7 +146,7 @@ def _place(
     """
     facing = normals.sum(axis=1)
 
-    def normal_at(z: float) -> tuple[int, Floats, Floats]:
+    def normal_at(z: float) -> tuple[int, Real, Real]:
         number, weights, _ = _in_front(corners, 0.0, z, facing)
         normal = weights @ normals[number]
         return number, weights, normal / np.linalg.norm(normal)
@@ -184,7 +182,7 @@ def _place(
     return place
 
 
-def _in_front(corners: Floats, x: float, z: float, normals: Floats) -> tuple[int, Floats, bool]:
+def _in_front(corners: Real, x: float, z: float, normals: Real) -> tuple[int, Real, bool]:
     """Return the triangle seen first from −y at this place, its barycentric weights, and True.
 
     Where no triangle is, it is the nearest one that faces −y, and False.
@@ -192,7 +190,7 @@ def _in_front(corners: Floats, x: float, z: float, normals: Floats) -> tuple[int
     a, b, c = np.moveaxis(corners[..., [0, 2]], 1, 0)
     point = np.array([x, z])
 
-    def area(p: Floats, q: Floats, r: Floats) -> Floats:
+    def area(p: Real, q: Real, r: Real) -> Real:
         return np.asarray(
             (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
             - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
@@ -211,7 +209,7 @@ def _in_front(corners: Floats, x: float, z: float, normals: Floats) -> tuple[int
     return number, np.full(3, 1.0 / 3.0), False
 
 
-def geometry(elevations: Floats) -> tuple[float, Floats]:
+def geometry(elevations: Real) -> tuple[float, Real]:
     """Return the ring's elevation, degrees, and the tangential parts (n,) of ω_i + ω_o upwards.
 
     elevations : (n,) of the label's normal, degrees, from its lower to its upper edge; where they

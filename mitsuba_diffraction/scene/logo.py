@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import distance_transform_edt, grey_dilation, grey_erosion
 
+from ..arrays import Real
 from ..errors import DiffractionError
 from ..images import read_picture
 from ..optics.colour import decode_srgb, linear_srgb, response
 from .hologram import Hologram, hologram
 
-Floats = NDArray[np.float64]
 Labels = NDArray[np.intp]
 
 #: Wavelengths, nm, of the pure hues, and of the dots that mix white and purple.
@@ -46,7 +46,7 @@ class Areas(NamedTuple):
     """
 
     labels: Labels
-    colours: Floats
+    colours: Real
 
 
 def areas(file: Path, *, colours: int = 6, dots: int = 512, keep_ground: bool = False) -> Areas:
@@ -101,13 +101,13 @@ def _read(file: Path, dots: int) -> NDArray[np.uint8]:
     return np.asarray(rgba.resize((width, height), Image.Resampling.BICUBIC))
 
 
-def _palette(colours: Floats, most: int) -> Floats:
+def _palette(colours: Real, most: int) -> Real:
     """Return the most frequent of distinct colours (n, 3), at most `most`."""
     row = Image.fromarray(colours[None].astype(np.uint8))
     reduced = row.quantize(64, Image.Quantize.MEDIANCUT)
     table = np.array(reduced.getpalette() or [], float).reshape(-1, 3)
     counts = np.bincount(np.asarray(reduced).ravel(), minlength=len(table))
-    chosen: list[Floats] = []
+    chosen: list[Real] = []
     for n in np.argsort(-counts):
         if counts[n] < _LEAST * len(colours) or len(chosen) == most:
             break
@@ -116,7 +116,7 @@ def _palette(colours: Floats, most: int) -> Floats:
     return np.array(chosen or [table[counts.argmax()]])
 
 
-def _nearest(rgb: Floats, palette: Floats, even: NDArray[np.bool_]) -> Labels:
+def _nearest(rgb: Real, palette: Real, even: NDArray[np.bool_]) -> Labels:
     """Return the number of each pixel's colour; of blended pixels, a colour of the areas beside."""
     distance = np.linalg.norm(rgb[..., None, :] - palette, axis=-1)
     sure = distance.argmin(axis=-1)
@@ -130,7 +130,7 @@ def _nearest(rgb: Floats, palette: Floats, even: NDArray[np.bool_]) -> Labels:
     return np.asarray(np.where(even, sure, blended))
 
 
-def wavelengths_of(colour: Floats) -> tuple[float, ...]:
+def wavelengths_of(colour: Real) -> tuple[float, ...]:
     """Return the wavelengths, nm, whose mixture has the hue of a colour (3,), sRGB 0 to 255."""
     if np.ptp(colour) < _GREY * colour.max():
         return WHITE
@@ -141,14 +141,14 @@ def wavelengths_of(colour: Floats) -> tuple[float, ...]:
     return (float(spectrum[turn.argmin()]),) if turn.min() < _PURE else PURPLE
 
 
-def _angle(xyz: Floats) -> Floats:
+def _angle(xyz: Real) -> Real:
     """Return the angle of chromaticities (…, 3) around white, degrees."""
     white = np.array([0.3127, 0.3290])
     x, y = np.moveaxis(xyz[..., :2] / xyz.sum(axis=-1, keepdims=True) - white, -1, 0)
     return np.degrees(np.arctan2(y, x))
 
 
-def logo(parts: Areas, *, tangential: Floats, orientation: float, period: float) -> Hologram:
+def logo(parts: Areas, *, tangential: Real, orientation: float, period: float) -> Hologram:
     """Return the textures of the gratings that show the colours, with a blank margin.
 
     Dark colours have a lower weight.

@@ -9,10 +9,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ..arrays import Real, Whole
 
 
 class MeshArrays(NamedTuple):
@@ -26,20 +24,20 @@ class MeshArrays(NamedTuple):
     materials : (m,) number of each triangle's material in a glTF file, or None.
     """
 
-    positions: Floats
-    normals: Floats | None
-    uv: Floats | None
-    faces: Ints
-    materials: Ints | None = None
+    positions: Real
+    normals: Real | None
+    uv: Real | None
+    faces: Whole
+    materials: Whole | None = None
 
 
 class SmoothMesh(NamedTuple):
     """Arrays of a triangle mesh that has normals; see `MeshArrays`."""
 
-    positions: Floats
-    normals: Floats
-    uv: Floats | None
-    faces: Ints
+    positions: Real
+    normals: Real
+    uv: Real | None
+    faces: Whole
 
 
 def mesh_arrays(mesh: Any) -> MeshArrays:
@@ -59,7 +57,7 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
     return MeshArrays(positions, normals, uv, mesh_faces(mesh))
 
 
-def mesh_faces(mesh: Any) -> Ints:
+def mesh_faces(mesh: Any) -> Whole:
     """Read the faces of a `mi.Mesh`, (m, 3) indices of vertices."""
     return np.array(_call(mesh, "faces_buffer", "faces"), np.int64).reshape(-1, 3)
 
@@ -74,7 +72,7 @@ def _call(mesh: Any, before: str, since: str) -> Any:
     return getattr(mesh, before if hasattr(mesh, before) else since)()
 
 
-def _of_vertices(values: Any, width: int, mesh: Any, index: str) -> Floats:
+def _of_vertices(values: Any, width: int, mesh: Any, index: str) -> Real:
     """Return a row for each vertex; an empty index map stands for the rows as they are."""
     rows = np.array(values, np.float64).reshape(-1, width)
     rows_of = np.array(getattr(mesh, index)(), np.int64) if hasattr(mesh, index) else np.array([])

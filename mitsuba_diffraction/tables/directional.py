@@ -11,8 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-Real = NDArray[np.float64]
-Array = NDArray[np.float32]
+from ..arrays import Real, Single
 
 #: The grid ends at this polar angle, rad; values beyond are those at its end.
 LAST_ANGLE = math.radians(89.5)
@@ -41,7 +40,7 @@ class DirectionGrid:
         return np.asarray(np.arange(self.azimuthal) * (2.0 * math.pi / self.azimuthal), np.float64)
 
     @property
-    def ones(self) -> Array:
+    def ones(self) -> Single:
         """Weights of 1."""
         return np.ones((self.polar + 1, self.azimuthal), np.float32)
 
@@ -91,14 +90,14 @@ class LinearMap:
     matrix: scipy.sparse.csr_array
     shape: tuple[int, ...]
 
-    def __call__(self, values: NDArray[np.floating]) -> Array:
+    def __call__(self, values: NDArray[np.floating]) -> Single:
         return np.asarray((self.matrix @ values.ravel()).reshape(self.shape))
 
-    def summed(self, shares: Array) -> LinearMap:
+    def summed(self, shares: Single) -> LinearMap:
         """Return the map to sums over the last axis, by shares (…, m)."""
         return self.summed_in(np.full(shares.shape[:-1], shares.shape[-1]), shares)
 
-    def summed_in(self, counts: NDArray[np.integer], shares: Array) -> LinearMap:
+    def summed_in(self, counts: NDArray[np.integer], shares: Single) -> LinearMap:
         """Return the map to sums by shares, of as many values in a row as `counts` (…) has."""
         corners = self.matrix
         data = corners.data * np.repeat(shares.ravel(), 4)
@@ -120,14 +119,14 @@ class DirectionalTable:
     """
 
     wavelengths: Real
-    values: Array
+    values: Single
 
     @property
     def grid(self) -> DirectionGrid:
         """Directions of the values."""
         return DirectionGrid(self.values.shape[1] - 1, self.values.shape[2])
 
-    def at(self, theta: ArrayLike, phi: ArrayLike, wavelength: float) -> Array:
+    def at(self, theta: ArrayLike, phi: ArrayLike, wavelength: float) -> Single:
         """Interpolate at angles (rad) of any one shape and a wavelength (nm)."""
         return self.grid.interpolation(theta, phi)(self.page(wavelength))
 
@@ -136,7 +135,7 @@ class DirectionalTable:
         to_grid = self.grid.interpolation(grid.theta[:, None], grid.phi)
         return DirectionalTable(self.wavelengths, np.stack([to_grid(page) for page in self.values]))
 
-    def page(self, wavelength: float) -> Array:
+    def page(self, wavelength: float) -> Single:
         """Values at one wavelength (nm)."""
         place = np.interp(
             np.log(wavelength), np.log(self.wavelengths), np.arange(len(self.wavelengths))

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.special import ndtri
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...llvm import require_loaded_llvm
 from ...optics.geometry import wavenumber
@@ -33,8 +33,6 @@ from ...plugin.memory import upload
 from ...progress import Progress
 from ..maps.evaluate import opaque
 from ..maps.hemisphere import flat_interaction, polar, sub_samples
-
-Reals = NDArray[np.float64]
 
 #: Files hold the reflected light of one place.
 FILES = Consumer(
@@ -74,9 +72,9 @@ class ExportGrid(NamedTuple):
     resolution : number of nodes of outgoing directions, as each format has them.
     """
 
-    theta: Reals
-    phi: Reals
-    wavelengths: Reals
+    theta: Real
+    phi: Real
+    wavelengths: Real
     resolution: int
 
     def checked(self, values: int) -> ExportGrid:
@@ -120,10 +118,10 @@ class Nodes:
     """
 
     azimuths: int
-    polar: Reals
+    polar: Real
     ends: tuple[float, float]
-    directions: Callable[[Reals, Reals, Reals], tuple[Reals, Reals]]
-    place: Callable[[Reals, Reals], tuple[Reals, Reals]]
+    directions: Callable[[Real, Real, Real], tuple[Real, Real]]
+    place: Callable[[Real, Real], tuple[Real, Real]]
     spread: Callable[[float], tuple[float, float]]
     pole: bool = False
     cosine: bool = False
@@ -140,7 +138,7 @@ class Nodes:
         step = float(self.polar[1] - self.polar[0])
         return max(max(p * 2.0 * np.pi / self.azimuths, q * step) for p, q in sizes)
 
-    def hats(self, p: Reals, q: Reals) -> csr_array:
+    def hats(self, p: Real, q: Real) -> csr_array:
         """Return the hat functions at some directions, (nodes, n); a pole is its first node."""
         last = len(self.polar) - 1
         across = p * (self.azimuths / (2.0 * np.pi))
@@ -157,7 +155,7 @@ class Nodes:
         entries = np.concatenate(weights), (np.concatenate(rows), columns)
         return csr_array(entries, shape=(self.count, len(p)))
 
-    def lattice(self, step: float) -> tuple[Reals, Reals, Reals, Reals]:
+    def lattice(self, step: float) -> tuple[Real, Real, Real, Real]:
         """Return p and q at the middles of even parts, their areas, and numbers of 0 to 1.
 
         step : largest distance of samples, rad. The numbers are even over any part of the lattice.
@@ -191,12 +189,12 @@ class Laid(NamedTuple):
     light : of the same shape, share of the incident light at each node; its sum is reflected.
     """
 
-    values: Reals
-    light: Reals
+    values: Real
+    light: Real
 
 
 def laid(
-    bsdf: Any, nodes: Nodes, grid: ExportGrid, lights: Reals, progress: Progress
+    bsdf: Any, nodes: Nodes, grid: ExportGrid, lights: Real, progress: Progress
 ) -> Iterator[Laid]:
     """Yield a surface's light on nodes, for each direction to the light (n, 3).
 
@@ -247,7 +245,7 @@ def laid(
     progress(1, 1, "evaluating")
 
 
-def _values(nodes: Nodes, light: Reals, weight: Reals) -> Laid:
+def _values(nodes: Nodes, light: Real, weight: Real) -> Laid:
     """Return light (nodes, wavelengths) over ∫ hat cosθ dω (nodes,), 0 below the horizon."""
     known = weight > 0.0
     values = np.where(known[:, None], light, 0.0) / np.where(known, weight, 1.0)[:, None]
@@ -258,13 +256,13 @@ def _values(nodes: Nodes, light: Reals, weight: Reals) -> Laid:
     return Laid(values, light)
 
 
-def light_vectors(grid: ExportGrid) -> Reals:
+def light_vectors(grid: ExportGrid) -> Real:
     """Return the directions to the light of a grid, (n, 3), φ outermost; none is quite normal."""
     phi, theta = np.meshgrid(np.radians(grid.phi), np.radians(grid.theta), indexing="ij")
     return polar(np.maximum(theta, _LEAST_THETA).ravel(), phi.ravel())
 
 
-def _evaluated(bsdf: Any, wi: Reals, wo: Reals, wavelengths: Reals, shift: Reals) -> Reals:
+def _evaluated(bsdf: Any, wi: Real, wo: Real, wavelengths: Real, shift: Real) -> Real:
     """Return f cosθo of pairs (n, 3), each at its shift from the wavelengths, (n, w)."""
     towards, out = (
         mi.Vector3f(*(upload(mi.Float, axis.astype(np.float32)) for axis in part.T))
@@ -294,7 +292,7 @@ class _Orders:
         self._turn = np.array([[turn[0], turn[1]], [-turn[1], turn[0]]])  # shading frame to patch
         self._lookup = lookup_in(self._table, Arrays, coated=True, elements=False)
 
-    def on(self, nodes: Nodes, wi: Reals, wavelengths: Reals, step: float) -> Reals:
+    def on(self, nodes: Nodes, wi: Real, wavelengths: Real, step: float) -> Real:
         """Return the light of one direction on nodes, (nodes, wavelengths)."""
         pattern = sub_samples(_LOBE_SAMPLES)
         spread = ndtri(pattern[:, :2]) / (math.sqrt(2.0) * self._sigma)

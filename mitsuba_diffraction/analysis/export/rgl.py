@@ -17,10 +17,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...atomic import atomic_path
 from ...progress import Progress, silent
 from ..maps.hemisphere import polar
-from .nodes import ExportGrid, Nodes, Reals, laid, light_vectors
+from .nodes import ExportGrid, Nodes, laid, light_vectors
 
 #: Default directions to the light, degrees, nodes of the half vector, and step of wavelengths, nm.
 DEFAULT = ExportGrid(
@@ -69,7 +70,7 @@ def save_rgl(
         _check_written(temporary, numbers)
 
 
-def _directions(wi: Reals, p: Reals, u: Reals) -> tuple[Reals, Reals]:
+def _directions(wi: Real, p: Real, u: Real) -> tuple[Real, Real]:
     theta_m = 0.5 * np.pi * u * u
     half = polar(theta_m, p - np.pi)
     cosine = np.maximum(half @ wi, 0.0)
@@ -77,7 +78,7 @@ def _directions(wi: Reals, p: Reals, u: Reals) -> tuple[Reals, Reals]:
     return 2.0 * cosine[:, None] * half - wi, 4.0 * cosine * np.sin(theta_m) * np.pi * u
 
 
-def _place(wi: Reals, wo: Reals) -> tuple[Reals, Reals]:
+def _place(wi: Real, wo: Real) -> tuple[Real, Real]:
     x, y, z = (wi + wo).T
     theta_m = np.arctan2(np.hypot(x, y), z)
     return (np.arctan2(y, x) + np.pi) % (2.0 * np.pi), np.sqrt(theta_m * (2.0 / np.pi))

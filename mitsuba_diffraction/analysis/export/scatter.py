@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import Real
 from ...atomic import atomic_path
 from ...columns import save_numbers
 from ...progress import Progress, silent
 from ..maps.hemisphere import polar
-from .nodes import ExportGrid, Nodes, Reals, laid, light_vectors
+from .nodes import ExportGrid, Nodes, laid, light_vectors
 
 #: Default directions to the light, degrees, nodes of θ of the eye, and wavelengths, nm.
 DEFAULT = ExportGrid(
@@ -74,7 +75,7 @@ def save_csv(
     save_numbers(path, CSV_COLUMNS, _columns(bsdf, grid, progress))
 
 
-def _columns(bsdf: Any, grid: ExportGrid, progress: Progress) -> Reals:
+def _columns(bsdf: Any, grid: ExportGrid, progress: Progress) -> Real:
     """Return θ and φ of the light, θ and φ of the eye, degrees, wavelength and f, (n, 6)."""
     n = grid.resolution
     grid.checked(_AZIMUTHS * n * n)
@@ -96,10 +97,10 @@ def _columns(bsdf: Any, grid: ExportGrid, progress: Progress) -> Reals:
     return np.concatenate(blocks)
 
 
-def _directions(wi: Reals, p: Reals, q: Reals) -> tuple[Reals, Reals]:
+def _directions(wi: Real, p: Real, q: Real) -> tuple[Real, Real]:
     return polar(q, p), np.sin(q)
 
 
-def _place(wi: Reals, wo: Reals) -> tuple[Reals, Reals]:
+def _place(wi: Real, wo: Real) -> tuple[Real, Real]:
     x, y, z = wo.T
     return np.arctan2(y, x) % (2.0 * np.pi), np.arctan2(np.hypot(x, y), z)

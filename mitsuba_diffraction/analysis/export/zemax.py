@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import Real
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...progress import Progress, silent
-from .nodes import ExportGrid, Nodes, Reals, laid, light_vectors
+from .nodes import ExportGrid, Nodes, laid, light_vectors
 
 #: Default directions of the mirror, degrees, nodes of the radial angle to 170°, and wavelength, nm.
 DEFAULT = ExportGrid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np.array([550.0]), 86)
@@ -62,7 +63,7 @@ def save_zemax(
         temporary.write_text("\n".join([*lines, "DataEnd", ""]), "ascii", "replace")
 
 
-def _frame(wi: Reals) -> tuple[Reals, Reals, Reals]:
+def _frame(wi: Real) -> tuple[Real, Real, Real]:
     """Return the mirror direction, and the axes of azimuth 0 (towards the normal) and 90°."""
     mirror = wi * [-1.0, -1.0, 1.0]
     sine = np.hypot(*mirror[:2])
@@ -70,17 +71,17 @@ def _frame(wi: Reals) -> tuple[Reals, Reals, Reals]:
     return mirror, up, np.cross(mirror, up)
 
 
-def _directions(wi: Reals, p: Reals, q: Reals) -> tuple[Reals, Reals]:
+def _directions(wi: Real, p: Real, q: Real) -> tuple[Real, Real]:
     mirror, up, left = _frame(wi)
     across = np.cos(p)[:, None] * up + np.sin(p)[:, None] * left
     return np.cos(q)[:, None] * mirror + np.sin(q)[:, None] * across, np.sin(q)
 
 
-def _place(wi: Reals, wo: Reals) -> tuple[Reals, Reals]:
+def _place(wi: Real, wo: Real) -> tuple[Real, Real]:
     mirror, up, left = _frame(wi)
     x, y = wo @ up, wo @ left
     return np.arctan2(y, x) % (2.0 * np.pi), np.arctan2(np.hypot(x, y), wo @ mirror)
 
 
-def _row(values: Reals) -> str:
+def _row(values: Real) -> str:
     return "  ".join(f"{value:.5g}" for value in values.tolist())

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...optics.colour import delta_e, linear_srgb, response
@@ -21,8 +22,6 @@ from ...progress import Progress, silent
 from ...reference import window_power
 from ...reference.arguments import sigmas_of
 from ...tables.table import DiffractionTable, q_limit_of
-
-Array = NDArray[np.float64]
 
 #: Steps of a sum over wavelengths, nm.
 STEPS = (2.0, 5.0, 10.0, 20.0, 40.0)
@@ -42,11 +41,11 @@ class Sample:
     """Pairs of directions and wavelengths with the exact window sum of each."""
 
     # (n, 3), exact in single precision
-    wi: Array
-    wo: Array
-    wavelength: Array  # (n,) nm, exact in single precision
+    wi: Real
+    wo: Real
+    wavelength: Real  # (n,) nm, exact in single precision
     near: NDArray[np.bool_]  # (n,) whether the pair lies within 3/σ of order 0
-    exact: Array  # (n,) ⟨|P|²⟩ / 4π²σ⁴ by `reference`, in double precision
+    exact: Real  # (n,) ⟨|P|²⟩ / 4π²σ⁴ by `reference`, in double precision
 
     @classmethod
     def draw(
@@ -67,25 +66,25 @@ class Sample:
             progress(i + 1, n, f"the exact answer, {coherence}")
         return cls(*pairs, exact / (4.0 * np.pi**2 * sigmas.orders**4))
 
-    def error(self, sums: Array) -> tuple[float, float]:
+    def error(self, sums: Real) -> tuple[float, float]:
         """Return Σ|sums − exact| / Σ exact, near order 0 and elsewhere."""
         difference = np.abs(sums - self.exact)
         parts = self.near, ~self.near
         near, far = (float(difference[p].sum() / self.exact[p].sum()) for p in parts)
         return near, far
 
-    def window_sums(self, table: DiffractionTable) -> Array:
+    def window_sums(self, table: DiffractionTable) -> Real:
         """Look up the window sums (n,) of the pairs in a table, in double precision."""
         return _window_sums(table, self.wi, self.wo, self.wavelength)
 
 
-def _window_sums(table: DiffractionTable, wi: Array, wo: Array, wavelength: Array) -> Array:
+def _window_sums(table: DiffractionTable, wi: Real, wo: Real, wavelength: Real) -> Real:
     """Return window sums of pairs (…, 3) at wavelengths that their shape is broadcast with."""
     k, (u, v, w) = wavenumber(wavelength), diffraction_coordinates(wi, wo)
     return table.window_sum(k * u, k * v, k * w)
 
 
-def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) -> Array:
+def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) -> Real:
     """Draw unit vectors (n, 3), uniform above cosθ = lowest, exact in single precision."""
     z = rng.uniform(lowest, 1.0, n)
     phi = rng.uniform(0.0, 2 * np.pi, n)
@@ -93,7 +92,7 @@ def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) ->
     return as_single(np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=1))
 
 
-def as_single(values: Array) -> Array:
+def as_single(values: Real) -> Real:
     """Round values to single precision, so that NumPy and Dr.Jit get the same input."""
     return values.astype(np.float32).astype(np.float64)
 
@@ -101,9 +100,9 @@ def as_single(values: Array) -> Array:
 class LitPairs(NamedTuple):
     """Pairs of directions and wavelengths, exact in single precision."""
 
-    wi: Array  # (n, 3)
-    wo: Array  # (n, 3)
-    wavelength: Array  # (n,) nm
+    wi: Real  # (n, 3)
+    wo: Real  # (n, 3)
+    wavelength: Real  # (n,) nm
     near: NDArray[np.bool_]  # (n,) whether the pair lies within 3/σ of order 0
 
 

@@ -25,10 +25,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Real
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .fingers import ramp
-from .noise import FloatArray, Rng, grain, rounded
+from .noise import Rng, grain, rounded
 
 _SHORTEST_RUN, _LONGEST_RUN = 3, 11  # channel bits
 # λ of P(n) = λ⁻ⁿ: the root above 1 of Σ λ⁻ⁿ = 1 over n = 3..11; 2 to the capacity, 0.5418 bit
@@ -142,8 +143,8 @@ def _disc(
 
 
 def _track(
-    rng: Rng, disc: Format, length: float, x: FloatArray, irregularity: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+    rng: Rng, disc: Format, length: float, x: Real, irregularity: float
+) -> tuple[Real, Real, Real]:
     """Draw the pits of one track of `length` µm, which is closed.
 
     Returns

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from .noise import FloatArray, Pair, Rng, sample_field, smooth_field
+from ...arrays import Real
+from .noise import Pair, Rng, sample_field, smooth_field
 
 # Sweeps that even out the columns around an inserted one, enough to spread the gap over a few
 # columns, and the sweep after which columns too close to their neighbour are removed.
@@ -54,11 +55,11 @@ class Layout:
 class FingerRow:
     """Fingers of one sheet, from left to right around the patch; arrays (n,), µm."""
 
-    x: FloatArray  # x of tips, ascending
-    y: FloatArray  # y of tips
-    lean: FloatArray  # displacement of the axis towards +x per µm from the tip towards −y
-    length: FloatArray  # from tip to the tip line of the row below
-    rise: FloatArray  # height of the finger above the others
+    x: Real  # x of tips, ascending
+    y: Real  # y of tips
+    lean: Real  # displacement of the axis towards +x per µm from the tip towards −y
+    length: Real  # from tip to the tip line of the row below
+    rise: Real  # height of the finger above the others
 
 
 def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[FingerRow]:
@@ -88,7 +89,7 @@ def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[FingerRow]:
     return rows
 
 
-def _columns(rng: Rng, extent: Pair, n_rows: int, layout: Layout) -> list[FloatArray]:
+def _columns(rng: Rng, extent: Pair, n_rows: int, layout: Layout) -> list[Real]:
     """Draw the tips' x for each row: even columns and extra ones over some rows, then displaced."""
     width, height = extent
     extra = round(layout.faults * width * height)
@@ -113,7 +114,7 @@ def _columns(rng: Rng, extent: Pair, n_rows: int, layout: Layout) -> list[FloatA
     return swayed
 
 
-def _along_rows(field: FloatArray, extent: Pair, rows: list[FloatArray]) -> list[FloatArray]:
+def _along_rows(field: Real, extent: Pair, rows: list[Real]) -> list[Real]:
     """Sample a periodic field at the tips of every row, before rows are displaced."""
     sizes = [x.size for x in rows]
     y = np.repeat(np.arange(len(rows)) * (extent[1] / len(rows)), sizes)
@@ -121,7 +122,7 @@ def _along_rows(field: FloatArray, extent: Pair, rows: list[FloatArray]) -> list
     return np.split(values, np.cumsum(sizes)[:-1])
 
 
-def _relaxed(rows: list[FloatArray], r: int, width: float, pitch: float) -> FloatArray:
+def _relaxed(rows: list[Real], r: int, width: float, pitch: float) -> Real:
     """Move a row's tips towards even gaps and towards the tips above and below."""
     x = rows[r]
     right = np.append(x[1:], x[0] + width)
@@ -134,21 +135,21 @@ def _relaxed(rows: list[FloatArray], r: int, width: float, pitch: float) -> Floa
     return np.sort(x + move)
 
 
-def _thinned(x: FloatArray, width: float, least: float) -> FloatArray:
+def _thinned(x: Real, width: float, least: float) -> Real:
     """Remove the tips of a row that are closer than `least` to their left neighbour."""
     close = np.diff(x, prepend=x[-1] - width) < least
     close &= ~np.roll(close, 1)  # of three close tips, only the middle one is removed
     return x[~close] if close.any() and not close.all() else x
 
 
-def _nearest(x: FloatArray, others: FloatArray, width: float) -> npt.NDArray[np.intp]:
+def _nearest(x: Real, others: Real, width: float) -> npt.NDArray[np.intp]:
     """Return the index of the nearest of `others` (ascending) to each x, around the patch."""
     around = np.concatenate([others[-1:] - width, others, others[:1] + width])
     place = np.searchsorted((around[1:] + around[:-1]) / 2, x)
     return (place - 1) % others.size
 
 
-def _around(difference: FloatArray, width: float) -> FloatArray:
+def _around(difference: Real, width: float) -> Real:
     """Return the shortest difference between two x around the patch."""
     return difference - width * np.round(difference / width)
 
@@ -179,8 +180,8 @@ class Blade:
 
 
 def overlay(
-    rows: list[FingerRow], extent: Pair, serration: FloatArray, blade: Blade
-) -> tuple[FloatArray, FloatArray]:
+    rows: list[FingerRow], extent: Pair, serration: Real, blade: Blade
+) -> tuple[Real, Real]:
     """Compute the upper envelope of all sheets and the distance of the floor from the fingers.
 
     `serration` (ny, nx), µm, displaces edges sideways; the results have its shape.
@@ -232,13 +233,13 @@ def overlay(
 
 
 def _profile(
-    u: FloatArray,
-    t: FloatArray,
-    pitch: FloatArray,
-    length: FloatArray,
-    serration: FloatArray,
+    u: Real,
+    t: Real,
+    pitch: Real,
+    length: Real,
+    serration: Real,
     blade: Blade,
-) -> tuple[FloatArray, FloatArray]:
+) -> tuple[Real, Real]:
     """Return the height of a sheet relative to its crest, and the distance from a finger's side.
 
     Both are in µm. u is the distance from the finger's axis over the pitch, 0 to ½; t as in
@@ -271,7 +272,7 @@ def _profile(
     return z, np.where(t > 0, outside, 0)
 
 
-def ramp(low: float, high: float, value: FloatArray) -> FloatArray:
+def ramp(low: float, high: float, value: Real) -> Real:
     """Return 0 below `low`, 1 above `high` and Hermite's cubic between them."""
     s = np.clip((value - low) / (high - low), 0.0, 1.0)
     return s * s * (3 - 2 * s)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import scipy
 
-from ..field import FloatArray as FloatArray
+from ...arrays import Real
 
 Rng = np.random.Generator
 #: Lengths along x and y, µm.
@@ -18,7 +18,7 @@ Shape = tuple[int, int]
 
 def smooth_field(
     rng: Rng, extent: Pair, correlation: Pair, slope: float, detail: float = 4.0
-) -> FloatArray:
+) -> Real:
     """Draw a periodic Gaussian field of unit variance whose power is ∝ (1 + |ql|²)^(−slope/2).
 
     l is `correlation`, µm along x and y (von Kármán's spectrum, Progress in the statistical theory
@@ -42,14 +42,14 @@ def smooth_field(
     return np.fft.irfft2(waves, (my, mx)) / math.sqrt(float((response**2).sum()))
 
 
-def sample_field(field: FloatArray, extent: Pair, x: FloatArray, y: FloatArray) -> FloatArray:
+def sample_field(field: Real, extent: Pair, x: Real, y: Real) -> Real:
     """Interpolate a periodic `field` (my, mx) over `extent` at points in µm, by cubic splines."""
     my, mx = field.shape
     indices = (y * (my / extent[1]), x * (mx / extent[0]))
     return np.asarray(scipy.ndimage.map_coordinates(field, indices, order=3, mode="grid-wrap"))
 
 
-def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> FloatArray:
+def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> Real:
     """Draw white noise blurred to grains of `size` (σ along x, along y, µm), of unit variance.
 
     Noise is drawn per pixel, so a seed gives another texture at another resolution. The statistics
@@ -73,7 +73,7 @@ def _filtered_variance(sigma: float, n: int) -> float:
     return float((impulse**2).sum())
 
 
-def rounded(heights: FloatArray) -> FloatArray:
+def rounded(heights: Real) -> Real:
     """Round heights in µm towards 0 to about a picometre: equal heights on every processor.
 
     Processors differ in the last bits of sines. A height that lies within them of a rounding step

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from ...arrays import Real
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .fingers import Blade, FingerRow, Layout, lay_out, overlay, ramp
-from .noise import FloatArray, Pair, Rng, Shape, grain, rounded, sample_field, smooth_field
+from .noise import Pair, Rng, Shape, grain, rounded, sample_field, smooth_field
 
 # Grid spacing of creases and bends, µm, independent of the pixels.
 _COARSE = 0.3
@@ -184,7 +185,7 @@ def _patch(
 
 def _surface(
     rng: Rng, extent: Pair, shape: Shape, rows: list[FingerRow], species: Species, roughness: float
-) -> FloatArray:
+) -> Real:
     """Draw sheets with frayed edges, streaks and pores of the floor, and noise, (ny, nx) in µm."""
     # scan lines run along x, and the probe meets an edge a little earlier or later on each
     fray = roughness * species.fray * grain(rng, extent, shape, (0.08, 0.018))
@@ -203,7 +204,7 @@ def _surface(
     return heights
 
 
-def _bent(rng: Rng, extent: Pair, shape: Shape, species: Species) -> FloatArray:
+def _bent(rng: Rng, extent: Pair, shape: Shape, species: Species) -> Real:
     """Draw the bending of the whole scale and its creases, (ny, nx) in µm."""
     reach = 30.0  # correlation length of creases, µm
     bend = smooth_field(rng, extent, species.bend_reach, 3.3, species.bend_reach[0] / _COARSE)
@@ -219,9 +220,7 @@ def _bent(rng: Rng, extent: Pair, shape: Shape, species: Species) -> FloatArray:
     return species.bend * bent - species.crease * creased
 
 
-def stamp(
-    shape: Shape, extent: Pair, x: FloatArray, y: FloatArray, radius: FloatArray, height: FloatArray
-) -> FloatArray:
+def stamp(shape: Shape, extent: Pair, x: Real, y: Real, radius: Real, height: Real) -> Real:
     """Draw the upper envelope (ny, nx) of rounded bumps at (x, y) on the torus, µm.
 
     A bump is height·(1 − r²/radius²)² within its radius; the envelope is 0 between bumps.
@@ -247,9 +246,7 @@ def stamp(
     return result.reshape(shape)
 
 
-def beads(
-    rng: Rng, extent: Pair, shape: Shape, rows: list[FingerRow], density: float
-) -> FloatArray:
+def beads(rng: Rng, extent: Pair, shape: Shape, rows: list[FingerRow], density: float) -> Real:
     """Draw small round beads on the crests of fingers, in swarms; `density` per µm²."""
     names = ("x", "y", "length", "lean")
     tip_x, tip_y, length, lean = (
@@ -266,7 +263,7 @@ def beads(
     return stamp(shape, extent, x, tip_y[finger] - t, radius, radius * (0.08 + 0.2 * rng.random(n)))
 
 
-def debris(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
+def debris(rng: Rng, extent: Pair, shape: Shape, density: float) -> Real:
     """Draw crumbs, alone or in loose heaps up to 2 µm across; `density` of heaps per µm²."""
     n = int(rng.poisson(density * extent[0] * extent[1]))
     spread = np.minimum(0.05 / (1 - rng.random(n)), 0.35)  # µm, heavy-tailed
@@ -278,7 +275,7 @@ def debris(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
     return stamp(shape, extent, x, y, radius, radius * (0.08 + 0.3 * rng.random(heap.size)))
 
 
-def flakes(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
+def flakes(rng: Rng, extent: Pair, shape: Shape, density: float) -> Real:
     """Draw particles with flat, tilted tops and straight, steep sides; `density` per µm²."""
     ny, nx = shape
     result = np.zeros(shape)
@@ -301,7 +298,7 @@ def flakes(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
     return result
 
 
-def scratches(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
+def scratches(rng: Rng, extent: Pair, shape: Shape, density: float) -> Real:
     """Draw thin broken lines, all at about the same angle; `density` per µm²."""
     n = int(rng.poisson(density * extent[0] * extent[1]))
     angle = np.radians(48 + 6 * rng.standard_normal(n))

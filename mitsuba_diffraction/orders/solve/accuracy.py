@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...arrays import Complex, Real
 from ...errors import warn
 from ..polarised import mueller_of, turned_axes
 from ..response import UNPOLARISED, CellResponse
@@ -14,7 +15,6 @@ from ..table import OrderTable
 from ..table_error import TableError, table_error, unpolarised
 from .jobs import Jobs, Problem
 from .nodes import Place, located
-from .stations import Complex, Real
 
 #: The error that 95 % of directions and wavelengths keep, in tolerances.
 WORST = 4.0

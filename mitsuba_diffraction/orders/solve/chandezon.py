@@ -30,12 +30,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, toeplitz
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from .films import Structure
 from .profiles import Profile
-from .stations import Real, Station
+from .stations import Station
 
-Complex = NDArray[Any]
+#: Real or complex numbers.
+Numbers = NDArray[Any]
 
 # Samples of a period, from which Fourier coefficients are taken
 _SAMPLES = 8192
@@ -93,7 +95,7 @@ class Chandezon:
         """Name and settings."""
         return f"Chandezon's method, {2 * self.harmonics + 1} harmonics"
 
-    def amplitudes(self, station: Station) -> Complex:
+    def amplitudes(self, station: Station) -> Numbers:
         """Return the amplitudes between all channels; see `stations.Solver`.
 
         Raises a DiffractionError if the material is a perfect conductor, or a thin sheet.
@@ -122,14 +124,14 @@ class Chandezon:
             ]
         )
 
-    def _factor(self, alpha: Real, beta: Real) -> Complex:
+    def _factor(self, alpha: Real, beta: Real) -> Numbers:
         """Return the ratio of fluxes (j, 1, q, 1), with phases from the top of films to z = 0."""
         x, z = (sum(self._lengths) * part for part in self._direction)
         came, left = np.exp(1j * (alpha * x - beta * z)), np.exp(-1j * (alpha * x + beta * z))
         flux = np.sqrt(beta / beta[:, None]) * came[:, None] * left
         return np.asarray(flux[:, None, :, None])
 
-    def _admittance(self, alpha: Real, wavelength: float, indices: Complex, y: float) -> Complex:
+    def _admittance(self, alpha: Real, wavelength: float, indices: Numbers, y: float) -> Numbers:
         """Return Y (2n, 2n) of the material under its films, see (2).
 
         indices : of the material, and of the films upwards.
@@ -234,12 +236,12 @@ class _Waves(NamedTuple):
     rho : (waves,) rate along d.
     """
 
-    field: Complex
-    normal: Complex
-    rho: Complex
+    field: Numbers
+    normal: Numbers
+    rho: Numbers
 
 
-def _admittance(waves: _Waves, along: Real, epsilon: complex, squared: complex) -> Complex:
+def _admittance(waves: _Waves, along: Real, epsilon: complex, squared: complex) -> Numbers:
     """Return Y (2n, 2n) of waves in one direction in a medium.
 
     along : α y. squared : k² across the grooves.
@@ -251,7 +253,7 @@ def _admittance(waves: _Waves, along: Real, epsilon: complex, squared: complex) 
     return np.block([[turn, slope], [-epsilon * slope, turn]]) / squared
 
 
-def _reflected(above: _Waves, below: Complex, down: _Waves, along: Real, k: float) -> Complex:
+def _reflected(above: _Waves, below: Numbers, down: _Waves, along: Real, k: float) -> Numbers:
     """Return the fields (j, 2, q, 2) of the last waves above, in light of the waves `down`.
 
     below : admittance under the surface. along, k : as for `_admittance`, above it.
@@ -292,13 +294,13 @@ def _places() -> Real:
     return np.asarray((np.arange(_SAMPLES) + 0.5) / _SAMPLES)
 
 
-def _coefficients(values: Complex) -> Complex:
+def _coefficients(values: Numbers) -> Numbers:
     """Return the means of f exp(−2πimu/d); m is the index, counted from the end below 0."""
     m = np.fft.fftfreq(_SAMPLES, 1.0 / _SAMPLES)
     return np.asarray(np.fft.fft(values) / _SAMPLES * np.exp(-1j * np.pi * m / _SAMPLES))
 
 
-def _toeplitz(values: Real, n: int) -> Complex:
+def _toeplitz(values: Real, n: int) -> Numbers:
     """Return the matrix of a product with f; the numbers of channels rise towards −x."""
     c = _coefficients(values)
     return np.asarray(toeplitz(c[-np.arange(n)], c[:n]))

@@ -19,12 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, toeplitz
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from .films import Slice, Structure
 from .profiles import Profile
-from .stations import LEAST_NORMAL, Real, Station
+from .stations import LEAST_NORMAL, Station
 
-Complex = NDArray[Any]
+#: Real or complex numbers.
+Numbers = NDArray[Any]
 
 # Decimals of µm that tell edges of layers apart
 _DIGITS = 9
@@ -91,7 +93,7 @@ class CoupledWaves:
         """Name and settings."""
         return f"coupled waves, {2 * self.harmonics + 1} harmonics, {len(self.layers)} layers"
 
-    def amplitudes(self, station: Station) -> Complex:
+    def amplitudes(self, station: Station) -> Numbers:
         """Return the amplitudes between all channels; see `stations.Solver`."""
         if station.indices is None:
             raise DiffractionError(
@@ -102,7 +104,7 @@ class CoupledWaves:
         pairs = zip(station.wavelengths, indices, station.along, strict=True)
         return np.stack([self._solve(station, *pair) for pair in pairs])
 
-    def _solve(self, station: Station, wavelength: float, indices: Complex, y: float) -> Complex:
+    def _solve(self, station: Station, wavelength: float, indices: Numbers, y: float) -> Numbers:
         """Return the amplitudes at one wavelength; indices of the material, and of the structure.
 
         The scattering matrix of tangential E is carried up from the material (`_across`); through a
@@ -128,9 +130,9 @@ class CoupledWaves:
 class Modes(NamedTuple):
     """Modes exp(iqz) of a layer, z down and lengths over 2π/λ: E = W(c⁺ + c⁻), H = V(c⁺ − c⁻)."""
 
-    q: Complex  # (2n,)
-    electric: Complex  # W (2n, 2n): Ex, then Ey
-    magnetic: Complex  # V
+    q: Numbers  # (2n,)
+    electric: Numbers  # W (2n, 2n): Ex, then Ey
+    magnetic: Numbers  # V
 
 
 class _Scattering(NamedTuple):
@@ -144,10 +146,10 @@ class _Scattering(NamedTuple):
     inner : (m, m), from upward waves in the material to downward ones.
     """
 
-    back: Complex
-    up: Complex
-    down: Complex
-    inner: Complex
+    back: Numbers
+    up: Numbers
+    down: Numbers
+    inner: Numbers
 
 
 class Inner(NamedTuple):
@@ -166,7 +168,7 @@ class Inner(NamedTuple):
 def scattered(
     waves: tuple[Real, Real], layers: Iterable[tuple[float, Modes]], epsilon: complex,
     above: NDArray[np.int64], top: float, inner: Inner,
-) -> Complex:  # fmt: skip
+) -> Numbers:  # fmt: skip
     """Return the amplitudes (ports, 2, ports, 2) of layers on a material; see `Solver`.
 
     Parameters
@@ -204,7 +206,7 @@ def uniform(x: Real, y: Real, epsilon: complex) -> Modes:
     return Modes(q, np.eye(len(q)), right / q)
 
 
-def modes(x: Real, y: Real, across_x: Complex, across_y: Complex, along: Complex) -> Modes:
+def modes(x: Real, y: Real, across_x: Numbers, across_y: Numbers, along: Numbers) -> Modes:
     """Return the modes of a layer whose ε is a matrix for Ex, for Ey and for Ez."""
     left, right = _products(x, y, across_x, across_y, along)
     square, electric = np.linalg.eig(left @ right)
@@ -214,7 +216,7 @@ def modes(x: Real, y: Real, across_x: Complex, across_y: Complex, along: Complex
     return Modes(q, electric, (right @ electric) / q)
 
 
-def _layer(x: Real, y: Real, media: Complex, filled: Sequence[_Filled]) -> Modes:
+def _layer(x: Real, y: Real, media: Numbers, filled: Sequence[_Filled]) -> Modes:
     """Return the modes of a layer; media : ε by number."""
     shares = [float(np.sum(part.ends[:, 1] - part.ends[:, 0])) for part in filled]
     if all(share in (0.0, 1.0) for share in shares):
@@ -225,8 +227,8 @@ def _layer(x: Real, y: Real, media: Complex, filled: Sequence[_Filled]) -> Modes
 
 
 def _products(
-    x: Real, y: Real, across_x: Complex, across_y: Complex, along: Complex
-) -> tuple[Complex, Complex]:
+    x: Real, y: Real, across_x: Numbers, across_y: Numbers, along: Numbers
+) -> tuple[Numbers, Numbers]:
     """Return P and Q of dE/dz = iP H and dH/dz = iQ E (Maxwell's equations, E and H tangential)."""
     one, inverse = np.eye(len(x)), np.linalg.inv(along)
     from_x, from_y = x[:, None] * inverse, y[:, None] * inverse
@@ -261,7 +263,7 @@ def _across(above: Modes, below: Modes, lower: _Scattering) -> _Scattering:
     return _Scattering(back, kept - back @ sent, down, lower.inner - down @ sent)
 
 
-def _amplitudes(total: _Scattering, rows: NDArray[np.int64], sides: tuple[_Side, _Side]) -> Complex:
+def _amplitudes(total: _Scattering, rows: NDArray[np.int64], sides: tuple[_Side, _Side]) -> Numbers:
     """Return amplitudes (ports, 2, ports, 2) from the scattering of tangential E; see `Solver`.
 
     rows : of both components of E of the channels above.
@@ -304,7 +306,7 @@ class _Side:
         return np.asarray(np.sqrt(np.where(self._lit, self._square, 1.0)))
 
     @property
-    def phase(self) -> Complex:
+    def phase(self) -> Numbers:
         """Factors that move amplitudes from the end of the profile; 0 where none propagates."""
         return np.asarray(self._lit * np.exp(2j * np.pi * self.height * self.z))
 
@@ -331,7 +333,7 @@ class _Side:
         return np.asarray(self._square > (LEAST_NORMAL * self.index) ** 2)
 
 
-def _toeplitz(n: int, media: Complex, filled: Sequence[_Filled]) -> Complex:
+def _toeplitz(n: int, media: Numbers, filled: Sequence[_Filled]) -> Numbers:
     """Return the Toeplitz matrix of the Fourier coefficients of values of `media`, see `_layer`.
 
     Harmonic m has the factor exp(−2πi m x): the numbers of channels rise towards −x.
@@ -341,14 +343,14 @@ def _toeplitz(n: int, media: Complex, filled: Sequence[_Filled]) -> Complex:
     return np.asarray(toeplitz(coefficients[n - 1 :], coefficients[n - 1 :: -1]))
 
 
-def _transform(ends: Real, m: NDArray[np.int64]) -> Complex:
+def _transform(ends: Real, m: NDArray[np.int64]) -> Numbers:
     """Return ∫ exp(2πi m x) dx over intervals (n, 2)."""
     middle, width = ends.mean(axis=1)[:, None], np.diff(ends)
     terms = width * np.sinc(m * width) * np.exp(2j * np.pi * m * middle)
     return np.asarray(terms.sum(axis=0))
 
 
-def _summed(media: Complex, filled: Sequence[_Filled], parts: Sequence[Any], whole: Any) -> Any:
+def _summed(media: Numbers, filled: Sequence[_Filled], parts: Sequence[Any], whole: Any) -> Any:
     """Return the transform of values of `media`, from the transforms of the parts, and of 1."""
     steps = (media[part.medium] - media[part.around] for part in filled)
     return media[_ABOVE] * whole + sum(step * part for step, part in zip(steps, parts, strict=True))

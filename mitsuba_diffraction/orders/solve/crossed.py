@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arrays import Complex, Real
 from ...errors import DiffractionError, warn
 from ..response import orders_between
 from .coupled import Inner, Modes, modes, scattered
 from .grating_index import TabulatedIndex
 from .profiles import UnitCell
-from .stations import Complex, CrossedStation, Real
+from .stations import CrossedStation
 
 #: k above which a material absorbs, and staircases of metal converge slowly.
 _ABSORBING = 1e-3

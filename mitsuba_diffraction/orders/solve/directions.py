@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arrays import Complex, Real
 from ...errors import DiffractionError
 from ..listed import Lights, listed_table, mirror_of, warn_of_gaps
 from ..lists import check_light
@@ -32,7 +33,7 @@ from .settings import (
     announce_stage,
     header_of,
 )
-from .stations import LEAST_COSINE, Complex, Grating, Real
+from .stations import LEAST_COSINE, Grating
 
 #: Lights by which the resolution is chosen at most, and solutions at most.
 _COMPARED, _MOST = 5, 100_000

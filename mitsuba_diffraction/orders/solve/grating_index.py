@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arrays import Real
 from ...columns import WAVELENGTH_UNITS, parse_columns
 from ...errors import DiffractionError, quoted
 from ...files import read_bytes
@@ -25,7 +26,6 @@ from ...limits import LARGEST_TEXT
 from ...optics.materials import PERFECT, material_named
 from ...plugin.conductors import tabulated_index
 
-Real = NDArray[np.float64]
 Range = tuple[float, float]
 Index = tuple[Range, Callable[[Real], Real]]  #: wavelengths, µm, and a function of them
 

@@ -31,9 +31,10 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve as solve_linear
 
+from ...arrays import Complex, Real
 from ...errors import DiffractionError
 from .profiles import Profile
-from .stations import LEAST_NORMAL, Complex, Real, Station
+from .stations import LEAST_NORMAL, Station
 
 #: Order of the mesh graded towards corners, which gratinglab recommends (Kress 1990).
 GRADING = 4

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Complex, Real
 from ...errors import DiffractionError, check_choice, one_line
 from ...progress import Progress, silent
 from ...tables.store import Record, read_record, write_record
@@ -28,7 +29,7 @@ from .crossed import CrossedWaves
 from .integral import IntegralSolver
 from .nodes import AnyPlace, CrossedPlace
 from .sheet import sheet_efficiencies
-from .stations import LEAST_COSINE, Complex, Grating, Real, Solver, on_both_sides
+from .stations import LEAST_COSINE, Grating, Solver, on_both_sides
 
 Spot = TypeVar("Spot", bound=AnyPlace)
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
+from ...arrays import Complex, Real
 from ...errors import DiffractionError
 from .. import cells
 from ..cells import Counts
@@ -19,7 +20,7 @@ from .accuracy import diffuse_light
 from .jobs import Jobs, Problem
 from .nodes import MAX_NODES, MIN_NODES, Line, Place, count_for, lines
 from .settings import Settings, announce_stage
-from .stations import Complex, Grating, Real, reversed_light
+from .stations import Grating, reversed_light
 
 #: Expected error over the tolerance from which on a solution is refused: lines across bands
 #: overestimate it by about as much.

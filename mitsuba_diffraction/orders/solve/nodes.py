@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
 
+from ...arrays import Complex, Real
 from .. import cells
 from ..cells import Counts
-from .stations import Complex, Grating, Real, reversed_light
+from .stations import Grating, reversed_light
 
 #: Numbers of nodes along τ, ρ and w that are tried, from which the series are taken at most. Along
 #: w a line is one station, and gold's index changes quickly.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arrays import Complex, Real
 from ...errors import DiffractionError, check_choice, quoted
 from ...heights.field import HeightField
 from .. import cells
@@ -41,7 +42,7 @@ from .resolution import (
     resolved,
 )
 from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of
-from .stations import Complex, Grating, Real
+from .stations import Grating
 
 #: Times that a table which misses its tolerance gets more nodes, and their factor.
 REFINEMENTS, _FINER = 2, 1.4

@@ -7,14 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ...arrays import Real
 from ...columns import read_columns
 from ...errors import DiffractionError, check_choice, quoted, warn
 from ...files import FileKind, kind_of
 from ...heights.lengths import micrometres_of, number_between
-
-Real = NDArray[np.float64]
 
 #: Vertices of a sinusoid: their secants are within 1e-4 of the depth.
 _SINUSOID = 256

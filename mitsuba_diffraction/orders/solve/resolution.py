@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from .chandezon import stretched_period
 from .jobs import CROSSED, MOST_RESOLUTION, Jobs, Problem
 from .nodes import AnyPlace, Place, kinds_of
-from .stations import Real, reversed_light
+from .stations import reversed_light
 
 #: Factor between resolutions that are compared, and comparisons at most.
 STEP, _MOST = 1.35, 12

@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from ...arrays import Complex, Real
 from ...optics import fresnel
-from .stations import Complex, Real, Station
+from .stations import Station
 
 #: Share of the light that a totally reflecting side sends back: where a channel has no way out, as
 #: in a flat sheet, the sum would not end.

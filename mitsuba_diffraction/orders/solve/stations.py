@@ -13,14 +13,13 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arrays import Complex, Real
 from .. import cells
 from ..response import orders_between
 from .films import Structure
 from .grating_index import TabulatedIndex
 from .profiles import Profile, UnitCell
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Number = TypeVar("Number", np.float64, np.complex128)
 
 #: Least c = √(1 − y²), and least |cosine| of any order across the grooves: 0.006° from grazing.

@@ -13,11 +13,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from .maps import uploaded
 from .scene import RealtimeScene
 from .texels import Packed, pack_grid
-
-Array = NDArray[np.float64]
 
 _BATCHES, _POINTS = 2, 1 << 16  # batches, and points of each that two paths begin at
 _DEPTH = 7  # largest number of segments of a path
@@ -61,10 +60,10 @@ def pack_bounces(mitsuba_scene: Any, scene: RealtimeScene) -> Packed:
 
 #: Places of surfaces, directions that light leaves along or normals that it arrives at, and its
 #: radiance in linear sRGB, (n, 3) each.
-_Light = tuple[Array, Array, Array]
+_Light = tuple[Real, Real, Real]
 
 
-def _lit_box(places: Array, low: Array, high: Array) -> tuple[Array, Array]:
+def _lit_box(places: Real, low: Real, high: Real) -> tuple[Real, Real]:
     """Return the corners of a box around nearly all places (n, 3) that lie in another box."""
     inside = places[((places >= low) & (places <= high)).all(axis=1)]
     if not len(inside):
@@ -72,7 +71,7 @@ def _lit_box(places: Array, low: Array, high: Array) -> tuple[Array, Array]:
     return np.quantile(inside, _RARE, axis=0), np.quantile(inside, 1.0 - _RARE, axis=0)
 
 
-def _traced(scene: Any, origins: Array, rng: np.random.Generator, seed: int) -> list[list[_Light]]:
+def _traced(scene: Any, origins: Real, rng: np.random.Generator, seed: int) -> list[list[_Light]]:
     """Trace two paths from each of the points that random rays from origins (n, 3) meet.
 
     Returns the light that leaves the surfaces which rays to and from these points meet, and the
@@ -114,8 +113,8 @@ def _met(scene: Any, rays: Any, active: Any) -> tuple[Any, Any]:
 
 
 def _radiance(
-    scene: Any, origins: Array, directions: Array, active: NDArray[np.bool_], seed: int
-) -> Array:
+    scene: Any, origins: Real, directions: Real, active: NDArray[np.bool_], seed: int
+) -> Real:
     """Path-trace the radiance along rays (n, 3), linear sRGB (n, 3), and 0 of inactive ones."""
     import drjit as dr
     import mitsuba as mi
@@ -137,12 +136,12 @@ def _radiance(
     return np.clip(radiance, 0.0, _BRIGHTEST * max(float(radiance.mean()), 1e-30))
 
 
-def _rows(values: Any) -> Array:
+def _rows(values: Any) -> Real:
     """Read vectors (n, 3)."""
     return np.array(values, np.float64).reshape(3, -1).T
 
 
-def _add(sums: Array, places: Array, axes: Array, radiance: Array) -> None:
+def _add(sums: Real, places: Real, axes: Real, radiance: Real) -> None:
     """Add radiances (n, 3) at places (n, 3), in cells, to sums over signs, axes and cells."""
     size = np.array(sums.shape[4:1:-1])
     x, y, z = np.clip(places.astype(int), 0, size - 1).T
@@ -156,7 +155,7 @@ def _add(sums: Array, places: Array, axes: Array, radiance: Array) -> None:
                 flat[sign, axis, :, n] += np.bincount(cell, weights[:, n], flat.shape[2])
 
 
-def _filled(sums: Array) -> Array:
+def _filled(sums: Real) -> Real:
     """Return the means (kinds, signs, axes, cells, 3), also in neighbours of cells with light."""
     blurred = scipy.ndimage.gaussian_filter(
         sums, (0, 0, 0, _BLUR, _BLUR, _BLUR, 0), mode="constant"

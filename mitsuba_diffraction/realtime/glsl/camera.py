@@ -6,18 +6,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Camera:
     """Perspective camera, a pinhole or a thin lens."""
 
-    to_world: Array  # (4, 4); the camera looks along its z axis, y is up and x to the left
+    to_world: Real  # (4, 4); the camera looks along its z axis, y is up and x to the left
     fov: float  # angle of view across the picture, degrees
     size: tuple[int, int]  # width and height, pixels
     offset: tuple[float, float] = (0.0, 0.0)  # principal point's offset, in widths and heights
@@ -25,7 +23,7 @@ class Camera:
     focus: float = 1.0  # distance of the plane in focus
 
     @property
-    def eye(self) -> Array:
+    def eye(self) -> Real:
         """Position of the camera (3,)."""
         return self.to_world[:3, 3]
 
@@ -33,7 +31,7 @@ class Camera:
         """Return this camera with a picture of another size."""
         return replace(self, size=(width, height))
 
-    def sampled(self, pixel: Array, lens: Array) -> Camera:
+    def sampled(self, pixel: Real, lens: Real) -> Camera:
         """Return the pinhole camera through one point of each pixel and of the lens.
 
         pixel : (2,) offset from the middle of the pixel, −1/2 to 1/2.
@@ -52,7 +50,7 @@ class Camera:
         )
         return replace(self, to_world=moved, offset=offset)
 
-    def view_projection(self, low: Array, high: Array) -> Array:
+    def view_projection(self, low: Real, high: Real) -> Real:
         """Return the matrix from world to OpenGL's clip space, for a scene between two corners.
 
         The matrix is for column vectors. Near and far planes lie close around the scene, for
@@ -77,7 +75,7 @@ class Camera:
         return projection @ to_camera
 
 
-def box_corners(low: Array, high: Array) -> Array:
+def box_corners(low: Real, high: Real) -> Real:
     """Return the corners (8, 3) of a box from the lowest and highest one."""
     return np.array([[(low, high)[n >> i & 1][i] for i in range(3)] for n in range(8)])
 

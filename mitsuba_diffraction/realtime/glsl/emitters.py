@@ -32,8 +32,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...scene.elements import name_of
 from .lights import (
@@ -46,8 +46,6 @@ from .lights import (
     without_extent,
 )
 from .surroundings import Environment, beside, is_flat
-
-Array = NDArray[np.float64]
 
 #: Refusal of a scene in the dark.
 NO_LIGHT = "no emitter of the scene lights the surfaces that diffract; add one, or brighten it"
@@ -66,7 +64,7 @@ class Emitters:
     Raises a DiffractionError if the irradiance of all emitters is 0.
     """
 
-    def __init__(self, scene: Any, middle: Array) -> None:
+    def __init__(self, scene: Any, middle: Real) -> None:
         self.omissions: list[str] = []  # unsupported emitters, in a few words each
         self._sequences: list[_LightSequence] = []
         self._scene = scene  # keeps the shapes of area lights alive
@@ -111,7 +109,7 @@ class Emitters:
         shares = [s.looked_up() if s.emitter.ptr == emitter.ptr else 0.0 for s in self._sequences]
         return float(self.probabilities @ np.array(shares))
 
-    def _features(self, light: Lamp) -> Array:
+    def _features(self, light: Lamp) -> Real:
         """Return the light's irradiance in the middle by colour and spherical harmonics, (27,)."""
         direction = light.place[:3] - light.place[3] * self._middle
         direction /= max(float(np.linalg.norm(direction)), 1e-12)
@@ -121,7 +119,7 @@ class Emitters:
         return np.outer(colour, harmonics).ravel()
 
 
-def _nearest_to_mean(features: Array) -> list[int]:
+def _nearest_to_mean(features: Real) -> list[int]:
     """Return an order of rows (n, m) in which the mean of the first few is near the mean of all."""
     mean, total = features.mean(axis=0), np.zeros(features.shape[1])
     left, order = list(range(len(features))), list[int]()
@@ -136,7 +134,7 @@ def _nearest_to_mean(features: Array) -> list[int]:
 class _LightSequence:
     """Sequence of lights without extent that represents one emitter."""
 
-    def __init__(self, emitter: Any, middle: Array, environment: Environment | None) -> None:
+    def __init__(self, emitter: Any, middle: Real, environment: Environment | None) -> None:
         self.emitter, self._middle, self._environment = emitter, middle, environment
         self._fixed = without_extent(emitter, middle)
         self._blocks: dict[int, list[Lamp]] = {}
@@ -184,7 +182,7 @@ class _LightSequence:
             )
         ]  # fmt: skip
 
-    def _environment_block(self, start: int) -> tuple[Array, Array, Array, Array]:
+    def _environment_block(self, start: int) -> tuple[Real, Real, Real, Real]:
         """Draw a block of directions of an environment.
 
         Five in eight are directions of the sun, if the sky has one. The sun's share of the light is
@@ -207,7 +205,7 @@ class _LightSequence:
         looked_up = np.append(densities, np.zeros(len(sunward)))
         return values[order], directions[order], looked_up[order], waves
 
-    def _sun_block(self, start: int) -> tuple[Array, Array]:
+    def _sun_block(self, start: int) -> tuple[Real, Real]:
         """Draw irradiances and directions of the sun's part of a block; empty without a sun."""
         assert self._environment is not None
         samples = 4 * _BLOCK if self._environment.sun.any() else 1
@@ -221,7 +219,7 @@ class _LightSequence:
         return values[chosen] * factor, directions[chosen]
 
 
-def emission(light: Lamp, direction: Array) -> float:
+def emission(light: Lamp, direction: Real) -> float:
     """Return the share of its intensity that a light sends along a unit vector."""
     if not light.axis.any():
         return 1.0

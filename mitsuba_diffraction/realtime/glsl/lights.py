@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...optics.colour import daylight
 from ...scene.elements import name_of
 from .maps import uploaded
 from .packing import daylight_colour
-
-Array = NDArray[np.float64]
 
 _SAMPLES = 1024  # samples of a light with an extent
 _SUN_COSINE = float(np.cos(np.radians(0.6)))  # the sun's disc has a radius of 0.27°
@@ -24,13 +23,13 @@ class Lamp:
     """Light without extent: a direction, a point, a spot, or a point on an area light."""
 
     name: str  # name in messages
-    place: Array  # (4,) direction towards it and 0, or position and 1
-    wavelengths: Array  # (n,) nm
+    place: Real  # (4,) direction towards it and 0, or position and 1
+    wavelengths: Real  # (n,) nm
     # irradiance (direction) or intensity (point) relative to D65 of luminance 1, (n,), or (n, 3)
     # in RGB variants
-    spectrum: Array
+    spectrum: Real
     # (3,) axis of a spot, or normal of an area light; zeros: equal intensity in all directions
-    axis: Array = field(default_factory=lambda: np.zeros(3))
+    axis: Real = field(default_factory=lambda: np.zeros(3))
     # cutoff and beam of a spot, angles from its axis in rad; None for a point on an area light,
     # whose intensity is proportional to the cosine
     cone: tuple[float, float] | None = None
@@ -40,11 +39,11 @@ class Lamp:
     shape: int = 0  # address of the area light's shape; 0 for other lights
 
     @property
-    def colour(self) -> Array:
+    def colour(self) -> Real:
         """Colour in linear sRGB (3,)."""
         return daylight_colour(self.wavelengths, self.spectrum)
 
-    def irradiance(self, point: Array) -> Array:
+    def irradiance(self, point: Real) -> Real:
         """Return the irradiance at a point, linear sRGB (3,), without cosines and cones."""
         away = point - self.place[:3]
         return self.colour / (max(float(away @ away), 1e-12) if self.place[3] else 1.0)
@@ -56,11 +55,11 @@ class Lighting:
 
     lights: list[Lamp] = field(default_factory=list)  # without extent
     # (4, 3) linear sRGB: a plane of normal n gets the irradiance π (sky[0] + Σᵢ nᵢ sky[1 + i])
-    sky: Array = field(default_factory=lambda: np.zeros((4, 3)))
+    sky: Real = field(default_factory=lambda: np.zeros((4, 3)))
     omissions: list[str] = field(default_factory=list)  # in a few words each
 
     @property
-    def mean_spectrum(self) -> tuple[Array, Array]:
+    def mean_spectrum(self) -> tuple[Real, Real]:
         """Wavelengths and mean spectrum of all lights, relative to D65; 1 in RGB variants."""
         bright = [(light, light.colour.sum()) for light in self.lights]
         spectra = [light.spectrum / total for light, total in bright if total > 0.0]
@@ -69,7 +68,7 @@ class Lighting:
         return self.lights[0].wavelengths, np.mean(spectra, axis=0)
 
 
-def read_lights(scene: Any, middle: Array, most: int) -> Lighting:
+def read_lights(scene: Any, middle: Real, most: int) -> Lighting:
     """Read the emitters of a Mitsuba scene.
 
     Lights with an extent become lights without extent, with the same irradiance at `middle`: an
@@ -90,7 +89,7 @@ def read_lights(scene: Any, middle: Array, most: int) -> Lighting:
     return lighting
 
 
-def _add(lighting: Lighting, emitter: Any, middle: Array) -> None:
+def _add(lighting: Lighting, emitter: Any, middle: Real) -> None:
     """Add the lights, sky or omission of an emitter."""
     import mitsuba as mi
 
@@ -123,7 +122,7 @@ def _add(lighting: Lighting, emitter: Any, middle: Array) -> None:
         lighting.omissions.append(f"{name} ({kind})")
 
 
-def without_extent(emitter: Any, middle: Array) -> Lamp | None:
+def without_extent(emitter: Any, middle: Real) -> Lamp | None:
     """Return a directional, point or spot emitter as a light; None for other kinds."""
     import mitsuba as mi
 
@@ -146,8 +145,8 @@ def without_extent(emitter: Any, middle: Array) -> Lamp | None:
 
 
 def _mean_sample(
-    emitter: Any, point: Array, samples: int, sun: Array | None = None
-) -> tuple[Array, Array, Array, float]:
+    emitter: Any, point: Real, samples: int, sun: Real | None = None
+) -> tuple[Real, Real, Real, float]:
     """Average Mitsuba's samples of an emitter from a point, or only the samples of its sun.
 
     Returns wavelengths (n,) in nm, the irradiance (n,) or (n, 3) relative to D65, and the mean
@@ -164,7 +163,7 @@ def _mean_sample(
     return wavelengths, values.mean(axis=0), direction, float(share @ distances)
 
 
-def _sky(emitter: Any, point: Array, sun: Array | None = None) -> Array:
+def _sky(emitter: Any, point: Real, sun: Real | None = None) -> Real:
     """Return `Lighting.sky` of one emitter without its sun: spherical harmonics up to order 1.
 
     With L = Σ L_lm Y_lm the irradiance is Σ A_l L_lm Y_lm(n), A_0 = π, A_1 = 2π/3 (Ramamoorthi and
@@ -181,8 +180,8 @@ def _sky(emitter: Any, point: Array, sun: Array | None = None) -> Array:
 
 
 def sampled_directions(
-    emitter: Any, point: Array, samples: int, start: int = 0
-) -> tuple[Array, Array, Array, Array]:
+    emitter: Any, point: Real, samples: int, start: int = 0
+) -> tuple[Real, Real, Real, Real]:
     """Draw directions from a point to an emitter, by Mitsuba's sampling of its irradiance.
 
     start : number of the first sample in a sequence that fills the emitter evenly.
@@ -204,9 +203,7 @@ def sampled_directions(
     return values, directions, distances[:: lanes.quads], wavelengths
 
 
-def sampled_positions(
-    emitter: Any, samples: int, start: int = 0
-) -> tuple[Array, Array, Array, Array]:
+def sampled_positions(emitter: Any, samples: int, start: int = 0) -> tuple[Real, Real, Real, Real]:
     """Draw points on an area light, evenly over its area.
 
     Returns radiances times the area as of `sampled_directions`; positions and normals (samples, 3),
@@ -225,7 +222,7 @@ def sampled_positions(
     return values, lanes.vectors(sample.p), lanes.vectors(sample.n), wavelengths
 
 
-def radiance_along(emitter: Any, directions: Array) -> Array:
+def radiance_along(emitter: Any, directions: Real) -> Real:
     """Return the radiance of an environment from directions (n, 3), linear sRGB (n, 3)."""
     values, waves = spectra_along(emitter, directions)
     if values.ndim == 3:
@@ -233,7 +230,7 @@ def radiance_along(emitter: Any, directions: Array) -> Array:
     return values @ np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
 
 
-def spectra_along(emitter: Any, directions: Array) -> tuple[Array, Array]:
+def spectra_along(emitter: Any, directions: Real) -> tuple[Real, Real]:
     """Return the spectral radiance of an environment from directions (n, 3).
 
     Returns values as of `sampled_directions`, and the wavelengths in nm.
@@ -253,13 +250,13 @@ def area_of(shape: Any) -> float:
     return float(np.array(shape.surface_area()).ravel()[0])
 
 
-def emitted_radiance(shape: Any) -> Array:
+def emitted_radiance(shape: Any) -> Real:
     """Return the mean radiance that a shape emits, linear sRGB (3,)."""
     values, _, _, waves = sampled_positions(shape.emitter(), 64)
     return daylight_colour(waves, values.mean(axis=0) / area_of(shape))
 
 
-def scaled(values: Array, factors: NDArray[Any]) -> Array:
+def scaled(values: Real, factors: NDArray[Any]) -> Real:
     """Return spectra of samples (samples, ...), each times its factor (samples,)."""
     return np.asarray((values.T * factors).T)
 
@@ -289,16 +286,16 @@ class _Lanes:
         number = np.arange(start, start + self.samples)[:, None]
         return mi.Point2f(*self.uploaded((0.5 + number * [0.7548776662, 0.5698402910]) % 1.0))
 
-    def uploaded(self, vectors: Array) -> list[Any]:
+    def uploaded(self, vectors: Real) -> list[Any]:
         """Upload the components of a vector per sample (samples, n) to all lanes."""
         return uploaded(np.repeat(vectors, self.quads, axis=0))
 
-    def vectors(self, values: Any) -> Array:
+    def vectors(self, values: Any) -> Real:
         """Read one vector per sample, (samples, 3)."""
         vectors = np.array(values, np.float64).T.reshape(-1, 3)
         return np.broadcast_to(vectors, (self.count, 3))[:: self.quads]
 
-    def spectra(self, values: Any) -> tuple[Array, Array]:
+    def spectra(self, values: Any) -> tuple[Real, Real]:
         """Read values as of `sampled_directions`, and the wavelengths."""
         import mitsuba as mi
 

@@ -11,12 +11,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...tables.colour.build import LARGEST_RADIUS
 from ...tables.colour.proposals import IMPORTANCE, brightness
 from ...tables.colour.table import ColourTable
 from .texels import Packed, Texture, listed
-
-Array = NDArray[np.float64]
 
 #: Cells over (u, v) in rings, and directions in a list.
 RINGS, AZIMUTHS, _PLACES = 128, 1024, 1 << 16
@@ -26,7 +25,7 @@ _ZS = np.array([1.1, 1.45, 1.8])  # values of w, from oblique to nearly normal i
 _EVERYWHERE = 0.1  # share of directions that are drawn evenly
 
 
-def pack_lobes(power: Callable[[Array], Array], sigma: float) -> Packed:
+def pack_lobes(power: Callable[[Real], Real], sigma: float) -> Packed:
     """Pack directions of a surface's lobes and their densities.
 
     power : function that returns the brightness in the cells (rings, azimuths) between radii.
@@ -49,7 +48,7 @@ def pack_lobes(power: Callable[[Array], Array], sigma: float) -> Packed:
     )
 
 
-def colour_power(table: ColourTable, edges: Array, height_scale: float) -> Array:
+def colour_power(table: ColourTable, edges: Real, height_scale: float) -> Real:
     """Return the brightness of a table in the cells (rings, azimuths) between radii `edges`.
 
     height_scale : factor on the heights, the index of a coat included.

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...plugin.description import Mix, Surface
 from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
 from .packing import daylight_weights
 
-Array = NDArray[np.float64]
 #: Wavelengths (n,) in nm, and values (n,).
-Spectrum = tuple[Array, Array]
+Spectrum = tuple[Real, Real]
 
 _CHEQUERS = 512  # texels a side of a picture of 2 × 2 chequers
 _LAM = np.linspace(380.0, 740.0, 36)  # nm
@@ -30,10 +30,10 @@ _SOME = 256  # texels whose spectra are stored
 class Map:
     """Value over a surface: a constant, a picture, or an attribute of the mesh."""
 
-    value: Array  # (channels,), the constant
+    value: Real  # (channels,), the constant
     # (rows, columns, channels), row 0 at v = 0
     picture: NDArray[np.floating] | None = None
-    to_uv: Array = field(default_factory=lambda: np.eye(3))  # from texture coordinates to it
+    to_uv: Real = field(default_factory=lambda: np.eye(3))  # from texture coordinates to it
     attribute: str | None = None  # name of a mesh attribute
     clamped: bool = False  # whether the picture is clamped at its edges; else it repeats
     nearest: bool = False  # whether each texel has one value; else texels are interpolated
@@ -41,7 +41,7 @@ class Map:
     # colours of these texels under the light of the picture, (n, 3)
     colours: NDArray[np.floating] | None = None
 
-    def under(self, wavelengths: Array, spectrum: Array) -> Array:
+    def under(self, wavelengths: Real, spectrum: Real) -> Real:
         """Return the matrix (3, 3) from colours, as rows, to colours under another light.
 
         The matrix is a least-squares fit to the texels with stored spectra, since three numbers do
@@ -53,7 +53,7 @@ class Map:
         return np.eye(3) + self._fit @ change
 
     @cached_property
-    def _fit(self) -> Array:
+    def _fit(self) -> Real:
         """Pseudo-inverse (3, n) of the texels' colours, for fits to their spectra."""
         assert self.colours is not None
         return np.asarray(np.linalg.pinv(self.colours.astype(float), rcond=1e-3))
@@ -95,12 +95,12 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     return replace(result, spectra=evaluated(texture, uv[some], _LAM), colours=colours[some])
 
 
-def _weights(light: Spectrum) -> Array:
+def _weights(light: Spectrum) -> Real:
     """Return the matrix (36, 3) from reflectances over `_LAM` to colours under a light."""
     return daylight_weights(_LAM, np.interp(_LAM, *light))
 
 
-def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
+def _lit(texture: Any, uv: Real, light: Spectrum) -> NDArray[np.float32]:
     """Return the colours (points, 3) of a texture under a light, relative to the light's colour."""
     weights, total = _weights(light).astype(np.float32), np.zeros((len(uv), 3), np.float32)
     for start in range(0, len(_LAM), 4):
@@ -122,7 +122,7 @@ def axis_map(described: Surface) -> Map:
     if attribute is not None and stretched.texture is None:
         return Map(np.array([1.0, 0.0, stretched.number]), attribute=attribute)
 
-    def frame(uv: Array) -> Array:
+    def frame(uv: Real) -> Real:
         """Evaluate both textures."""
         values = described.frame(_interaction(uv))
         return np.stack([np.broadcast_to(np.array(x, float).ravel(), len(uv)) for x in values], 1)
@@ -137,7 +137,7 @@ def interval_maps(mix: Mix) -> list[Map]:
     Raises a DiffractionError for textures that do not fit one picture.
     """
 
-    def edges(uv: Array) -> Array:
+    def edges(uv: Real) -> Real:
         """Evaluate the cumulative weights; the outer ones lie beyond 0 and 1."""
         weights = mix.weights(_interaction(uv))
         values = [np.broadcast_to(np.array(weight, float).ravel(), len(uv)) for weight in weights]
@@ -152,7 +152,7 @@ def interval_maps(mix: Mix) -> list[Map]:
     return [replace(whole, picture=whole.picture[..., n : n + 2]) for n in range(len(mix.parts))]
 
 
-def _picture(textures: Sequence[Any], look_up: Callable[[Array], Array], name: str) -> Map:
+def _picture(textures: Sequence[Any], look_up: Callable[[Real], Real], name: str) -> Map:
     """Evaluate a function of textures at the texels of the largest one."""
     sizes, transforms = [], []
     for texture in textures:
@@ -182,7 +182,7 @@ def _picture(textures: Sequence[Any], look_up: Callable[[Array], Array], name: s
     )  # fmt: skip
 
 
-def _clamps(look_up: Callable[[Array], NDArray[np.floating]], to_uv: Array) -> bool:
+def _clamps(look_up: Callable[[Real], NDArray[np.floating]], to_uv: Real) -> bool:
     """Return whether a texture is clamped: outside, it is closer to its edge than repeated."""
     along = np.linspace(0.02, 0.98, 16)
     back = np.linalg.inv(to_uv)
@@ -205,7 +205,7 @@ def _attribute(texture: Any) -> str | None:
     return match[1] if match else None
 
 
-def _centres(texture: Any, width: int, height: int) -> tuple[Array, Array]:
+def _centres(texture: Any, width: int, height: int) -> tuple[Real, Real]:
     """Return (u, v) of the centres of all texels, and the texture's transform of coordinates."""
     import mitsuba as mi
 
@@ -218,7 +218,7 @@ def _centres(texture: Any, width: int, height: int) -> tuple[Array, Array]:
     return (np.linalg.inv(to_uv) @ inside)[:2].T, to_uv
 
 
-def _interaction(uv: Array) -> Any:
+def _interaction(uv: Real) -> Any:
     """Return surface interactions at texture coordinates (n, 2)."""
     import drjit as dr
     import mitsuba as mi
@@ -235,7 +235,7 @@ def uploaded(rows: NDArray[np.generic]) -> list[Any]:
     return [upload(mi.Float, column.astype(np.float32)) for column in rows.T]
 
 
-def evaluated(texture: Any, uv: Array, wavelengths: Array) -> NDArray[np.float32]:
+def evaluated(texture: Any, uv: Real, wavelengths: Real) -> NDArray[np.float32]:
     """Evaluate a texture: (points, wavelengths), or (points, 3) in RGB variants."""
     import mitsuba as mi
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...optics.boundary import MODELS
 from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
@@ -25,9 +26,6 @@ from .packing import (
     pack_powers,
 )
 from .texels import Packed, Uniform
-
-Array = NDArray[np.float64]
-
 
 #: Wavelengths at which a conductor's index is packed, nm; RGB variants have three of them.
 _INDEX_WAVELENGTHS = np.union1d(np.linspace(360.0, 830.0, 96), RGB_WAVELENGTHS)
@@ -103,7 +101,7 @@ def _reflectance(described: Surface) -> Packed:
     return pack_conductor(_INDEX_WAVELENGTHS, index.real, index.imag)
 
 
-def index_spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:
+def index_spectra(eta: Any, k: Any) -> tuple[Real, Real, Real]:
     """Evaluate the textures of an index η + ik; RGB values become three wavelengths.
 
     Returns wavelengths in nm, η and k, (n,) each.

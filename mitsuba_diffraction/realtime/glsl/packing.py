@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
 from ...optics.boundary import Model
@@ -21,8 +22,6 @@ from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired
-
-Array = NDArray[np.float64]
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
@@ -141,7 +140,7 @@ def pack_beneath(excesses: Sequence[DirectionalTable]) -> Packed:
     return Packed((texture,), {"energy_page": 0.0}, {"BENEATH": "", **_grid(len(excesses))})
 
 
-def _daylight_mean(table: DirectionalTable) -> Array:
+def _daylight_mean(table: DirectionalTable) -> Real:
     """Average over daylight's spectrum: linear sRGB on `FINE`, linear between the wavelengths."""
     place = np.interp(
         np.log(_LAM), np.log(table.wavelengths), np.arange(len(table.wavelengths), dtype=float)
@@ -151,7 +150,7 @@ def _daylight_mean(table: DirectionalTable) -> Array:
     return np.tensordot(np.stack(pages, axis=-1), shares @ daylight_weights(_LAM), 1)
 
 
-def daylight_weights(wavelengths: Array, relative: Array | float = 1.0) -> Array:
+def daylight_weights(wavelengths: Real, relative: Real | float = 1.0) -> Real:
     """Return the matrix (n, 3) from values over wavelengths in nm to linear sRGB under daylight.
 
     relative : spectrum (n,) of another light, relative to daylight.
@@ -161,7 +160,7 @@ def daylight_weights(wavelengths: Array, relative: Array | float = 1.0) -> Array
 
 
 @functools.lru_cache(maxsize=8)
-def _daylight(wavelengths: bytes) -> Array:
+def _daylight(wavelengths: bytes) -> Real:
     """Return linear sRGB (n, 3) of daylight's wavelengths in nm, the bytes of an array (n,)."""
     return np.asarray(linear_srgb(response(np.frombuffer(wavelengths))))
 
@@ -176,7 +175,7 @@ def _grid(pages: int) -> dict[str, str]:
     }
 
 
-def pack_responses(lights: Sequence[tuple[Array, Array]]) -> Packed:
+def pack_responses(lights: Sequence[tuple[Real, Real]]) -> Packed:
     """Pack the contribution of each light's wavelengths to linear sRGB, for `exact`.
 
     lights : wavelengths (n,) in nm of each light, and its spectrum relative to D65 of luminance 1,
@@ -194,13 +193,13 @@ def pack_responses(lights: Sequence[tuple[Array, Array]]) -> Packed:
     return Packed((Texture("responses", rows),), {"wavenumbers": WAVENUMBERS})
 
 
-def daylight_colour(wavelengths: Array, spectrum: Array) -> Array:
+def daylight_colour(wavelengths: Real, spectrum: Real) -> Real:
     """Return linear sRGB (3,) of a spectrum relative to D65, as in `pack_responses`."""
     values = np.stack([np.interp(_LAM, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
     return np.asarray((_daylight(_LAM.tobytes()) * values).sum(axis=0))
 
 
-def pack_conductor(wavelengths: Array, eta: Array, k: Array) -> Packed:
+def pack_conductor(wavelengths: Real, eta: Real, k: Real) -> Packed:
     """Pack a conductor's reflectance by angle and wavelength, and in linear sRGB under daylight.
 
     wavelengths : (n,) nm.
@@ -210,7 +209,7 @@ def pack_conductor(wavelengths: Array, eta: Array, k: Array) -> Packed:
     waves = np.linspace(*WAVENUMBERS, _WAVELENGTHS)
     lam = 2e3 * np.pi / waves
 
-    def reflectances(nm: Array) -> Array:
+    def reflectances(nm: Real) -> Real:
         """Return the reflectance (n, angles) at wavelengths (n,)."""
         index = np.interp(nm, wavelengths, eta) + 1j * np.interp(nm, wavelengths, k)
         return reflectance(cosines, index[:, None])

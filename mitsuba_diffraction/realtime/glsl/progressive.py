@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from .camera import Camera
 from .context import Bindings, ShaderPass, Target, VertexBuffer, compile_plain, set_uniforms
@@ -26,8 +27,6 @@ from .lights import Lamp
 from .packed_scene import PackedScene
 from .shadows import SIZE, Casters, ShadowMap
 from .texels import Packed, Uniform
-
-Array = NDArray[np.float64]
 
 # steps of two numbers each for the pixel, the lens, the shadow map and the lobes: fractional parts
 # of multiples of square roots of primes are independent (Richtmyer 1951); those of the golden
@@ -177,7 +176,7 @@ class ProgressiveLight:
             self._add.draw({}, {"frame": self._frame.colour}, adding=True)
             self._counts[kind] += 1
 
-    def _light(self, light: Lamp, camera: Camera, shift: Array) -> None:
+    def _light(self, light: Lamp, camera: Camera, shift: Real) -> None:
         """Draw one light with its shadows."""
         if not len(self._visible.places):
             return
@@ -189,7 +188,7 @@ class ProgressiveLight:
         textures = {"shadow_map": self._map.texture}
         self._draw_surfaces(light, camera, definitions, uniforms, each, textures)
 
-    def _look_up(self, camera: Camera, numbers: Array) -> None:
+    def _look_up(self, camera: Camera, numbers: Real) -> None:
         """Draw the surroundings that each pixel's lobes look up."""
         uniforms: dict[str, Uniform] = {"sequence": tuple(numbers.tolist())}
         each: list[dict[str, Uniform]] = [{} for _ in self._visible.windings]

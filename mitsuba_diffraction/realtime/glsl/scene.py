@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...scene.elements import check_attributes, name_of
 from ...scene.meshes import has_texcoords, mesh_arrays
@@ -20,8 +21,6 @@ from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
 from .shader_materials import Diffracting, ShaderMaterial, diffracts, read_materials
 from .source import LIGHTS
-
-Array = NDArray[np.float64]
 
 _RINGS, _SEGMENTS = 192, 384  # triangles of a sphere lie within 3e-5 of its radius
 
@@ -35,10 +34,10 @@ VERTEX = (
 class Triangles:
     """Vertices in world space; three consecutive ones are a triangle."""
 
-    positions: Array  # (n, 3)
-    normals: Array  # (n, 3)
-    tangents: Array  # (n, 3), ∂p/∂u, of any length
-    texcoords: Array  # (n, 2)
+    positions: Real  # (n, 3)
+    normals: Real  # (n, 3)
+    tangents: Real  # (n, 3), ∂p/∂u, of any length
+    texcoords: Real  # (n, 2)
     # (n,) index of each vertex in its mesh, or None
     vertices: NDArray[np.int64] | None = None
 
@@ -54,7 +53,7 @@ def triangles_of(shape: Any) -> Triangles | None:
     return _mesh_triangles(shape) if shape.is_mesh() else None
 
 
-def sample_normal(shape: Any) -> tuple[Array, Array]:
+def sample_normal(shape: Any) -> tuple[Real, Real]:
     """Return a point of a shape and the normal at it, (3,) each, `flip_normals` included."""
     import mitsuba as mi
 
@@ -63,7 +62,7 @@ def sample_normal(shape: Any) -> tuple[Array, Array]:
     return place, normal
 
 
-def _transformed(local: Triangles, to_world: Array, place: Array, normal: Array) -> Triangles:
+def _transformed(local: Triangles, to_world: Real, place: Real, normal: Real) -> Triangles:
     """Transform triangles to world space, with normals on the same side as `normal` at `place`."""
     linear = to_world[:3, :3]
     positions = local.positions @ linear.T + to_world[:3, 3]
@@ -99,7 +98,7 @@ def _mesh_triangles(shape: Any) -> Triangles:
     return Triangles(positions, normals, np.repeat(tangents, 3, axis=0), texcoords, corners)
 
 
-def default_tangents(normals: Array) -> Array:
+def default_tangents(normals: Real) -> Real:
     """Return Mitsuba's tangents without texture coordinates, (n, 3) (Duff et al. 2017)."""
     x, y, z = normals.T
     sign = np.where(z < 0.0, -1.0, 1.0)
@@ -107,7 +106,7 @@ def default_tangents(normals: Array) -> Array:
     return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=1)
 
 
-def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, ...]]) -> Triangles:
+def _grid(rows: int, columns: int, point: Callable[[Real, Real], tuple[Real, ...]]) -> Triangles:
     """Tessellate a parametrisation (u, v) ↦ position, normal, tangent."""
     s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
     position, normal, tangent = point(s.ravel(), t.ravel())
@@ -121,31 +120,31 @@ def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, 
 _X, _Z = np.eye(3)[[0, 2]]
 
 
-def _around(turns: Array) -> tuple[Array, Array]:
+def _around(turns: Real) -> tuple[Real, Real]:
     """Return unit vectors (n, 3) at angles around the z axis, and those along the circle."""
     cos, sin = np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)
     return np.stack([cos, sin, 0.0 * cos], axis=1), np.stack([-sin, cos, 0.0 * cos], axis=1)
 
 
-def _rectangle(u: Array, v: Array) -> tuple[Array, ...]:
+def _rectangle(u: Real, v: Real) -> tuple[Real, ...]:
     """Return positions, normals and tangents of Mitsuba's rectangle."""
     return np.stack([2.0 * u - 1.0, 2.0 * v - 1.0, 0.0 * u], axis=1), _Z, 2.0 * _X
 
 
-def _sphere(u: Array, v: Array) -> tuple[Array, ...]:
+def _sphere(u: Real, v: Real) -> tuple[Real, ...]:
     """Return positions, normals and tangents of Mitsuba's sphere."""
     outward, along = _around(u)
     p = np.sin(np.pi * v)[:, None] * outward + np.cos(np.pi * v)[:, None] * _Z
     return p, p, along
 
 
-def _disk(u: Array, v: Array) -> tuple[Array, ...]:
+def _disk(u: Real, v: Real) -> tuple[Real, ...]:
     """Return positions, normals and tangents of Mitsuba's disk."""
     radial, _ = _around(v)  # Mitsuba's u is the radius, v the azimuth
     return u[:, None] * radial, _Z, radial
 
 
-def _cylinder(u: Array, v: Array) -> tuple[Array, ...]:
+def _cylinder(u: Real, v: Real) -> tuple[Real, ...]:
     """Return positions, normals and tangents of Mitsuba's cylinder."""
     outward, along = _around(u)
     return outward + v[:, None] * _Z, outward, along
@@ -170,7 +169,7 @@ class SceneSurface:
     material: ShaderMaterial
     shape: Any  # shape of Mitsuba
     exact: bool  # whether all of its material is supported
-    radiance: Array | None = None  # (3,) linear sRGB, mean emitted radiance; None without light
+    radiance: Real | None = None  # (3,) linear sRGB, mean emitted radiance; None without light
 
     @property
     def table(self) -> Any:
@@ -184,7 +183,7 @@ class Glow:
     """A shape that emits light and reflects none."""
 
     vertices: NDArray[np.float32]  # (n, 17) attributes of `VERTEX`
-    radiance: Array  # (3,) linear sRGB, mean emitted radiance
+    radiance: Real  # (3,) linear sRGB, mean emitted radiance
 
 
 @dataclass(frozen=True)
@@ -194,8 +193,8 @@ class RealtimeScene:
     surfaces: tuple[SceneSurface, ...]
     camera: Camera
     lighting: Lighting
-    low: Array  # (3,) lowest corner of a box around all surfaces
-    high: Array  # (3,) highest corner
+    low: Real  # (3,) lowest corner of a box around all surfaces
+    high: Real  # (3,) highest corner
     omissions: tuple[str, ...]  # parts that are left out or simplified, in a few words each
     emitting: tuple[Glow, ...] = ()  # shapes that emit light and reflect none
     of_light: tuple[str, ...] = ()  # omissions that progressive light does support
@@ -212,13 +211,13 @@ class RealtimeScene:
         return tuple(surface for surface in all_surfaces if surface is not None)
 
     @property
-    def subject(self) -> tuple[Array, Array]:
+    def subject(self) -> tuple[Real, Real]:
         """Lowest and highest corner (3,) of the box around all surfaces that diffract."""
         subjects = (s for s in self.surfaces if s.material.diffraction is not None)
         return box_of([s.vertices[:, :3] for s in subjects])
 
     @property
-    def middle(self) -> Array:
+    def middle(self) -> Real:
         """Middle (3,) of the box around all surfaces that diffract."""
         return np.asarray(0.5 * np.add(*self.subject))
 
@@ -317,7 +316,7 @@ def _check_texcoords(shape: Any, name: str) -> None:
         )
 
 
-def box_of(positions: Sequence[NDArray[np.floating]]) -> tuple[Array, Array]:
+def box_of(positions: Sequence[NDArray[np.floating]]) -> tuple[Real, Real]:
     """Return the lowest and highest corner (3,) of a box around all positions (n, 3)."""
     low = np.min([p.min(axis=0) for p in positions], axis=0)
     high = np.max([p.max(axis=0) for p in positions], axis=0)
@@ -343,7 +342,7 @@ def _vertices(triangles: Triangles, material: ShaderMaterial, shape: Any) -> NDA
     )
 
 
-def _attribute(value: Map, triangles: Triangles, shape: Any, channels: int) -> Array:
+def _attribute(value: Map, triangles: Triangles, shape: Any, channels: int) -> Real:
     """Return the value of a map at all vertices, (n, channels) or (channels,)."""
     if value.attribute is None or triangles.vertices is None:
         return value.value[:channels]

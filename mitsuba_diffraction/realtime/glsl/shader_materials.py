@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Mix, Surface, describe
 from ...plugin.parameter_changes import children
@@ -23,7 +24,6 @@ _KINDS = ("RoughPlastic", "SmoothPlastic", "RoughConductor", "SmoothConductor", 
 #: Unsupported parameters of the principled BSDF.
 _LEFT_OUT = ("spec_trans", "anisotropic", "sheen", "flatness", "clearcoat", "spec_tint")
 
-Array = NDArray[np.float64]
 
 #: Classes of BSDFs that wrap another BSDF; masks are not supported.
 _WRAPPERS = ("TwoSidedBRDF", "BumpMap", "NormalMap", "MaskBSDF")
@@ -270,7 +270,7 @@ def pack_conservation(material: ShaderMaterial, factors: Sequence[float] = (1.0,
     return material.diffraction.conservation([height_scale * factor for factor in factors])
 
 
-def pack_emission(radiance: Array | None) -> Packed:
+def pack_emission(radiance: Real | None) -> Packed:
     """Pack the radiance that a surface emits, (3,) linear sRGB, if any."""
     if radiance is None:
         return Packed()

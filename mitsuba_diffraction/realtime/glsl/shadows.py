@@ -17,15 +17,13 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from ...arrays import Real
 from .camera import Camera, box_corners
 from .context import Target, VertexBuffer, compile_plain, enable_sides, set_uniforms
 from .lights import Lamp
 from .scene import SceneSurface
 from .texels import Uniform
-
-Array = NDArray[np.float64]
 
 _GLANCES = 192  # pixels along the longer side of the picture that determines the visible part
 _SAME = 1e-6  # distance of points that are equal, relative to the scene's extent
@@ -45,8 +43,8 @@ _WIDEST = 0.1  # least cosine from the axis of a point light's perspective
 class Visible:
     """Part of a scene that a camera sees."""
 
-    places: Array  # (n, 3) visible points, on a coarse grid of pixels
-    outline: Array  # (m, 3) corners of their convex hull
+    places: Real  # (n, 3) visible points, on a coarse grid of pixels
+    outline: Real  # (m, 3) corners of their convex hull
     windings: list[int]  # of each closed surface that is seen from outside; 0 for others
 
 
@@ -54,20 +52,20 @@ class Visible:
 class Solid:
     """Extent, orientation and flatness of a surface's triangles."""
 
-    low: Array  # (3,) lowest corner of a box around the surface
-    high: Array  # (3,) highest corner
+    low: Real  # (3,) lowest corner of a box around the surface
+    high: Real  # (3,) highest corner
     # 1: closed, and triangles are counter-clockwise from outside; −1: clockwise; 0: open
     winding: int
     bias: float  # depth bias, texels
 
     @classmethod
-    def analyse(cls, triangles: Array, normals: Array) -> Solid:
+    def analyse(cls, triangles: Real, normals: Real) -> Solid:
         """Analyse triangles (n, 3, 3) with shading normals (n, 3, 3)."""
         low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
         bias = float(np.clip(_BENT * _bend(triangles, normals), *_BIAS))
         return cls(low, high, _winding(triangles), bias)
 
-    def encloses(self, place: Array) -> bool:
+    def encloses(self, place: Real) -> bool:
         """Return whether a point lies in the surface's box."""
         return bool(np.all((place >= self.low) & (place <= self.high)))
 
@@ -98,14 +96,14 @@ class Casters:
         self.high = np.max([solid.high for solid in self.solids], axis=0)
         self.corners = box_corners(self.low, self.high)
 
-    def draw(self, matrix: Array) -> None:
+    def draw(self, matrix: Real) -> None:
         """Draw all surfaces with a matrix (4, 4) from the scene to clip space."""
         self.context.enable_only(self.context.DEPTH_TEST)
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         for array in self._arrays:
             array.render()
 
-    def draw_map(self, matrix: Array, light: Lamp, visible: Visible) -> list[float]:
+    def draw_map(self, matrix: Real, light: Lamp, visible: Visible) -> list[float]:
         """Draw a shadow map into the current framebuffer.
 
         Returns the depth bias of each surface in texels.
@@ -151,7 +149,7 @@ class Casters:
             thing.release()
 
 
-def outline(places: Array) -> Array:
+def outline(places: Real) -> Real:
     """Return the corners of the convex hull of points (n, 3), or all points of a flat set."""
     try:
         return np.asarray(places[scipy.spatial.ConvexHull(places).vertices])
@@ -165,7 +163,7 @@ def _needed(solid: Solid, light: Lamp, from_outside: bool) -> str:
     return "away" if from_outside and not inside else "all"
 
 
-def _bend(triangles: Array, normals: Array) -> float:
+def _bend(triangles: Real, normals: Real) -> float:
     """Return the slope of normals relative to their triangle, the quantile 0.999."""
     flat = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     along = np.abs(np.einsum("ni,nci->nc", flat, normals))
@@ -174,7 +172,7 @@ def _bend(triangles: Array, normals: Array) -> float:
     return float(np.quantile(slopes[along.min(axis=1) > 0.0].ravel(), 0.999, method="higher"))
 
 
-def _winding(triangles: Array) -> int:
+def _winding(triangles: Real) -> int:
     """Return `Solid.winding`: closed if each edge is traversed equally often in both directions."""
     low = triangles.min(axis=(0, 1))
     step = max(float(np.ptp(triangles, axis=(0, 1)).max()), 1e-30) * _SAME
@@ -235,8 +233,8 @@ class ShadowMap:
         return shared, [{"shadow_bias": bias * scale} for bias in biases]
 
     def _perspective(
-        self, eye: Array, visible: Visible, shift: tuple[float, float]
-    ) -> tuple[Array, float]:
+        self, eye: Real, visible: Visible, shift: tuple[float, float]
+    ) -> tuple[Real, float]:
         """Return the perspective view from a point, as `parallel_view`, its scale at distance 1."""
         for places in (visible.outline, visible.places):  # corners suffice if all lie ahead
             away = places - eye
@@ -273,12 +271,12 @@ class ShadowMap:
 
 
 def parallel_view(
-    towards: Array,
-    places: Array,
-    corners: Array,
+    towards: Real,
+    places: Real,
+    corners: Real,
     size: int,
     shift: tuple[float, float] = (0.5, 0.5),
-) -> tuple[Array, float]:
+) -> tuple[Real, float]:
     """Return the parallel view of a scene from a direction.
 
     Returns the matrix (4, 4) from the scene to clip space, and the depth there that equals the
@@ -303,14 +301,14 @@ def parallel_view(
     return matrix, float((high - low).max()) / size * 2.0 / (far - near)
 
 
-def frame_along(axis: Array) -> Array:
+def frame_along(axis: Real) -> Real:
     """Return an orthonormal frame (3, 3) whose last row is the axis."""
     first = np.cross(np.eye(3)[np.abs(axis).argmin()], axis)
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(axis, first), axis])
 
 
-def _bounds(points: Array, size: int, shift: tuple[float, float]) -> tuple[Array, Array]:
+def _bounds(points: Real, size: int, shift: tuple[float, float]) -> tuple[Real, Real]:
     """Return the bounds of coordinates (n, 2), with a margin, shifted by parts of a texel."""
     low, high = points.min(axis=0), points.max(axis=0)
     half = 0.5 * np.maximum(high - low, 1e-6 * max(1.0, float(np.abs(points).max()))) * _MARGIN

@@ -6,9 +6,9 @@ import functools
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from ...arrays import Real
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...optics.orders import least_c
@@ -19,8 +19,6 @@ from ...orders.rows import kept, kinds_of, leaving_transmittance, rows
 from ...plugin.description import Surface
 from .lobes import AZIMUTHS, RINGS, pack_lobes
 from .texels import PAGE, Packed, Texture
-
-Array = NDArray[np.float64]
 
 #: Cells of a tile along τ, ρ and w, in air and under a layer, whose critical angles lie along w;
 #: fewer where a table would need more memory than this.
@@ -140,7 +138,7 @@ def cells_within(table: OrderTable, most_bytes: int) -> Counts:
     return counts
 
 
-def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
+def order_power(table: OrderTable, sigma: float, edges: Real) -> Real:
     """Return the brightness of all orders in the cells (rings, azimuths) between radii `edges`.
 
     Efficiencies are means over directions; layers only pass and mirror. Lobes of orders other than
@@ -160,7 +158,7 @@ def order_power(table: OrderTable, sigma: float, edges: Array) -> Array:
     deviation = 1e-3 * lam / (2.0 * np.pi * np.sqrt(2.0) * sigma)
     around = np.linspace(-np.pi, np.pi, AZIMUTHS + 1)  # edges of azimuths
 
-    def power(order: int) -> Array:
+    def power(order: int) -> Real:
         """Return the mean efficiency at all wavelengths, as bright as these are."""
         efficiency = lit * table.efficiency(x, y, np.clip(some, *table.reach), order)
         mean = (through[:, None] * efficiency).mean(axis=0)

@@ -20,14 +20,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...scene.elements import name_of
 from .lights import area_of, emitted_radiance, radiance_along
 from .scene import sample_normal
 from .shadows import frame_along
 from .texels import Packed, Texture, Uniform, as_half, pack_grid
-
-Array = NDArray[np.float64]
 
 # grid of distances
 _CELLS = 1 << 22  # approximate number of cells
@@ -44,7 +43,7 @@ _FLATS = 12  # largest number of flat shapes
 _PLASTIC = [0.8191725134, 0.6710436067, 0.5497004779]  # sequence of three numbers (Roberts 2018)
 
 
-def pack_obstacles(triangles: Array) -> Packed:
+def pack_obstacles(triangles: Real) -> Packed:
     """Pack the grid of distances to triangles (n, 3, 3), for shaders/obstacles.glsl."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
     # flat or thin scenes get a minimum thickness
@@ -62,7 +61,7 @@ def pack_obstacles(triangles: Array) -> Packed:
     return packed | Packed(definitions={"OBSTACLES": str(255.0 / _PER_CELL)})
 
 
-def _places(triangles: Array) -> Iterator[Array]:
+def _places(triangles: Real) -> Iterator[Real]:
     """Yield points (n, 3) all over triangles (n, 3, 3), in units of cells, some at a time."""
     sides = triangles - np.roll(triangles, 1, axis=1)
     longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
@@ -86,8 +85,8 @@ class Environment:
     # (rows, columns, 3) linear sRGB without the sun's disc, rows over the angle from the z axis,
     # columns around it
     picture: NDArray[np.float32]
-    sun: Array  # (3,) direction towards the middle of the sun, or zeros
-    sun_radiance: Array  # (3,) linear sRGB, mean over the sun's disc
+    sun: Real  # (3,) direction towards the middle of the sun, or zeros
+    sun_radiance: Real  # (3,) linear sRGB, mean over the sun's disc
 
     @classmethod
     def read(cls, scene: Any) -> Environment | None:
@@ -123,17 +122,17 @@ class Environment:
         picture = picture.reshape(rows, columns, 3)
         return cls(emitter, np.maximum(picture, 0.0).astype(np.float32), sun, radiance)
 
-    def in_sun(self, directions: Array) -> NDArray[np.bool_]:
+    def in_sun(self, directions: Real) -> NDArray[np.bool_]:
         """Return which of (n, 3) unit vectors point to the sun, as a mask."""
         return np.asarray(directions @ self.sun > np.cos(_AROUND_SUN))
 
     @property
-    def areas(self) -> Array:
+    def areas(self) -> Real:
         """Solid angles of the picture's texels, (rows, 1)."""
         edges = np.cos(np.linspace(0.0, np.pi, len(self.picture) + 1))
         return np.asarray(-np.diff(edges)[:, None] * 2.0 * np.pi / self.picture.shape[1])
 
-    def draw(self, start: int, count: int) -> tuple[Array, Array]:
+    def draw(self, start: int, count: int) -> tuple[Real, Real]:
         """Draw directions (count, 3) in proportion to the radiance, with densities (count,).
 
         The samples are stratified along a curve through all texels (Morton 1966), so that they
@@ -162,7 +161,7 @@ class Environment:
         """Radiance of all channels over the whole sphere."""
         return float((self.picture.sum(axis=2) * self.areas).sum())
 
-    def density(self, directions: Array) -> Array:
+    def density(self, directions: Real) -> Real:
         """Return the probability density (n,) of drawn unit vectors (n, 3) per solid angle.
 
         It follows the picture interpolated between texels, which shaders look up along lobes.
@@ -234,13 +233,13 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
     return Packed((), uniforms, {"FLATS": str(len(shapes)), "DISKS": str(disks)})
 
 
-def _directions(theta: Any, phi: Any) -> Array:
+def _directions(theta: Any, phi: Any) -> Real:
     """Return unit vectors (..., 3) from angles from the z axis and around it."""
     x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
     return np.stack(np.broadcast_arrays(x, y, np.cos(theta)), axis=-1)
 
 
-def beside(sun: Array, directions: Array) -> Array:
+def beside(sun: Real, directions: Real) -> Real:
     """Turn unit vectors (..., 3) that point to the sun, if any, aside, to the sky's light alone."""
     if not sun.any():
         return directions
@@ -249,7 +248,7 @@ def beside(sun: Array, directions: Array) -> Array:
     return np.where(inside[..., None], aside / np.linalg.norm(aside), directions)
 
 
-def _disc(axis: Array, radius: float) -> Array:
+def _disc(axis: Real, radius: float) -> Real:
     """Return unit vectors (64, 3), even over the disc of this angular radius around an axis."""
     number = np.arange(64) + 0.5
     angle, r = 2.399963 * number, np.sqrt(number / 64) * np.tan(radius)  # sunflower spiral

@@ -19,18 +19,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.sparse.linalg import splu
 
+from ...arrays import Complex, Real, Whole
 from ...errors import DiffractionError, check_choice
 from .tangents import carried
 from .trimesh import across, tangential, unit
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Complexes = NDArray[np.complex128]
 
 #: Guides that a field may follow.
 GUIDES = ("smooth", "x", "y", "z", "body")
@@ -42,17 +38,17 @@ _SHIFT = 1e-6  # share of the eigenvalues' scale: the Laplacian of a flat sheet 
 class WeldedMesh:
     """A mesh welded by position, with frames, transport along its edges, weights and areas."""
 
-    positions: Floats
-    faces: Ints
-    welded: Ints  # (n,) from the given vertices to these
-    frames: Floats  # (k, 2, 3) two unit vectors at right angles to the normal
-    normals: Floats
-    edges: Ints  # (e, 2)
-    weights: Floats
-    areas: Floats
+    positions: Real
+    faces: Whole
+    welded: Whole  # (n,) from the given vertices to these
+    frames: Real  # (k, 2, 3) two unit vectors at right angles to the normal
+    normals: Real
+    edges: Whole  # (e, 2)
+    weights: Real
+    areas: Real
 
     @classmethod
-    def weld(cls, positions: Floats, normals: Floats, faces: Ints) -> WeldedMesh:
+    def weld(cls, positions: Real, normals: Real, faces: Whole) -> WeldedMesh:
         places, welded = np.unique(positions, axis=0, return_inverse=True)
         welded = welded.reshape(-1)
         faces = welded[faces]
@@ -86,7 +82,7 @@ class WeldedMesh:
             np.maximum(areas, 1e-9 * areas.max()),  # vertices that no triangle uses
         )  # fmt: skip
 
-    def transport(self, to: Ints, origin: Ints) -> Complexes:
+    def transport(self, to: Whole, origin: Whole) -> Complex:
         """Rotations (e,) from the frames at `origin` to those at `to`, the normals' tilt apart."""
         laid_over = carried(self.frames[origin, 0], self.normals[origin], self.normals[to])
         x, y = ((laid_over * self.frames[to, n]).sum(axis=1) for n in (0, 1))
@@ -94,7 +90,7 @@ class WeldedMesh:
         length = np.abs(rotation)
         return np.where(length > 1e-6, rotation / np.maximum(length, 1e-6), 1.0)
 
-    def laplacian(self, rotation: Complexes | float) -> csc_array:
+    def laplacian(self, rotation: Complex | float) -> csc_array:
         """Σ w |z_i − r_ij z_j|² as a Hermitian matrix; r of the edges from second to first."""
         i, j = self.edges.T
         off = -self.weights * rotation
@@ -108,23 +104,23 @@ class WeldedMesh:
         i, j = self.edges.T
         return self.laplacian(self.transport(i, j))
 
-    def parts(self) -> tuple[int, Ints]:
+    def parts(self) -> tuple[int, Whole]:
         """Number of connected parts, and of which one each vertex is."""
         n = len(self.positions)
         ones = np.ones(len(self.edges))
         count, label = connected_components(coo_array((ones, tuple(self.edges.T)), shape=(n, n)))
         return int(count), label
 
-    def complex_of(self, vectors: Floats) -> Complexes:
+    def complex_of(self, vectors: Real) -> Complex:
         """Vectors, one or (k, 3), in the frames: their tangential parts."""
         x, y = ((self.frames[:, n] * vectors).sum(axis=1) for n in (0, 1))
         return x + 1j * y
 
-    def vectors_of(self, field: Complexes) -> Floats:
+    def vectors_of(self, field: Complex) -> Real:
         """The inverse of `complex_of`, (k, 3)."""
         return field.real[:, None] * self.frames[:, 0] + field.imag[:, None] * self.frames[:, 1]
 
-    def indices(self, field: Complexes) -> Ints:
+    def indices(self, field: Complex) -> Whole:
         """How often a field turns around each triangle, counter-clockwise seen from its front."""
         turn = np.zeros(len(self.faces))
         holonomy = np.ones(len(self.faces), dtype=np.complex128)
@@ -136,7 +132,7 @@ class WeldedMesh:
         # a direction carried once around comes back turned by the curvature within
         return np.round((turn + np.angle(holonomy)) / (2 * np.pi)).astype(np.int64)
 
-    def gradient(self, values: Floats) -> Floats:
+    def gradient(self, values: Real) -> Real:
         """Unit vectors along the gradient of a function that is linear on the triangles, (k, 3)."""
         corners, at = self.positions[self.faces], values[self.faces]
         normal = across(corners)
@@ -155,15 +151,15 @@ class DirectionField:
     """Unit tangent vector of every vertex, and mask of vertices without one."""
 
     # (n, 3) unit vectors at right angles to the normals; zero without a direction
-    directions: Floats
-    singular: Floats  # (k, 3) places around which the field turns
-    indices: Ints  # (k,) how often, counter-clockwise
+    directions: Real
+    singular: Real  # (k, 3) places around which the field turns
+    indices: Whole  # (k,) how often, counter-clockwise
 
 
 def direction_field(
-    positions: Floats,
-    normals: Floats,
-    faces: Ints,
+    positions: Real,
+    normals: Real,
+    faces: Whole,
     along: str = "smooth",
     *,
     smoothing: float = 0.03,
@@ -209,13 +205,13 @@ def direction_field(
     )
 
 
-def turned(directions: Floats, normals: Floats, degrees: float) -> Floats:
+def turned(directions: Real, normals: Real, degrees: float) -> Real:
     """Directions (n, 3) turned around their normals, counter-clockwise seen from outside."""
     angle = np.radians(degrees)
     return np.cos(angle) * directions + np.sin(angle) * np.cross(normals, directions)
 
 
-def _smoothest(surface: WeldedMesh) -> Complexes:
+def _smoothest(surface: WeldedMesh) -> Complex:
     """The lowest eigenvector of L z = λ M z on each connected part, by inverse iteration."""
     count, part = surface.parts()
     laplacian, mass = surface.connection_laplacian(), surface.areas
@@ -230,14 +226,14 @@ def _smoothest(surface: WeldedMesh) -> Complexes:
     return field
 
 
-def _following(surface: WeldedMesh, guide: Complexes, distance: float) -> Complexes:
+def _following(surface: WeldedMesh, guide: Complex, distance: float) -> Complex:
     """The field that follows a guide where it has a length, smooth within a distance."""
     mass = surface.areas / distance**2
     matrix = csc_array(surface.connection_laplacian() + diags_array(mass.astype(np.complex128)))
     return splu(matrix).solve(mass * guide)
 
 
-def _current(surface: WeldedMesh) -> Floats:
+def _current(surface: WeldedMesh) -> Real:
     """Unit vectors along the current from one end of each part to the other, (k, 3)."""
     count, part = surface.parts()
     n = len(surface.positions)

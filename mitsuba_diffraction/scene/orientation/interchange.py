@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real, Whole
 from ...errors import DiffractionError, one_line, quoted
 from ...extras import optional
 from ...files import GLTF, USD, path_beside, readable_file, refuse_pipe
 from ...gltf import load_gltf
 from ...inputs import note_input
 from ...limits import MOST_PLACED, bounded_memory, check_content, check_count
-from ..meshes import Floats, Ints, MeshArrays
+from ..meshes import MeshArrays
 from .mesh_indices import check_indices
 
 
@@ -89,7 +90,7 @@ def _joined(parts: list[NDArray[Any] | None]) -> NDArray[Any] | None:
 
 
 def _placed(
-    matrix: Floats, positions: Floats, normals: Floats | None, uv: Floats | None, faces: Ints
+    matrix: Real, positions: Real, normals: Real | None, uv: Real | None, faces: Whole
 ) -> MeshArrays:
     """Transform a mesh by a matrix (4, 4); faces stay counter-clockwise from outside."""
     linear = matrix[:3, :3]
@@ -194,7 +195,7 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
         )
 
 
-def _fans(counts: Ints) -> Ints:
+def _fans(counts: Whole) -> Whole:
     """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
 
     counts : corners of each polygon.
@@ -205,7 +206,7 @@ def _fans(counts: Ints) -> Ints:
     return np.stack([first, first + step + 1, first + step + 2], axis=-1).astype(np.int64)
 
 
-def _of_corners(values: Any, interpolation: str, corners: Ints, counts: Ints) -> Floats | None:
+def _of_corners(values: Any, interpolation: str, corners: Whole, counts: Whole) -> Real | None:
     """Return a primvar's value at each corner of the polygons, or None without values."""
     flat = values.ComputeFlattened()
     if not flat:

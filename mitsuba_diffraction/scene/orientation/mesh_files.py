@@ -11,18 +11,16 @@ from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Real, Whole
 from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import Ints, MeshArrays, SmoothMesh, mesh_arrays
+from ..meshes import MeshArrays, SmoothMesh, mesh_arrays
 from .interchange import interchange_mesh
 from .mesh_indices import CODES, Element, any_line_begins, check_mesh, parsed_header, ply_header
 from .trimesh import TriangleMesh, vertex_normals
-
-Floats = NDArray[np.float64]
 
 # Mitsuba's exceptions, text that is not UTF-8, and sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
@@ -55,17 +53,17 @@ def has_own_normals(path: str | os.PathLike[str]) -> bool:
     return _arrays(Path(path))[0].normals is not None
 
 
-def load_materials(path: str | os.PathLike[str]) -> Ints | None:
+def load_materials(path: str | os.PathLike[str]) -> Whole | None:
     """Return the number of each triangle's material in a glTF file, (m,); None for other files."""
     return _arrays(Path(path))[0].materials
 
 
-def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
+def load_orientation(path: str | os.PathLike[str]) -> Real | None:
     """Read the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
     return _arrays(Path(path))[1]
 
 
-def _arrays(file: Path) -> tuple[MeshArrays, Floats | None]:
+def _arrays(file: Path) -> tuple[MeshArrays, Real | None]:
     """Return the arrays of a mesh file as it has them, and its attribute vertex_orientation."""
     if file.suffix.lower() not in MESHES:
         raise DiffractionError(

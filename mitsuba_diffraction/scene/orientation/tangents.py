@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ...arrays import Real, Whole
 from ..elements import ORIENTATION
 from .trimesh import texture_tangents, unit
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 #: Degrees: a field that turns by more within a triangle, or from one to the next, breaks there.
@@ -42,7 +41,7 @@ TURN = 30.0  # degrees between neighbours from which on a seam shows
 FLAT = 1e-3  # a smaller share of the median ratio of texture area to surface area counts as 0
 
 
-def _turning(orientation: Floats) -> Bools:
+def _turning(orientation: Real) -> Bools:
     """(m, 3) whether a field turns by over 60° on the way from corner n to corner n + 1.
 
     orientation : (m, 3, 2) cosine and sine of the angle from each triangle's tangent.
@@ -52,7 +51,7 @@ def _turning(orientation: Floats) -> Bools:
     return np.asarray(cosine < np.cos(np.radians(BREAK)))
 
 
-def _length_of_breaks(places: Floats, faces: Ints, crossed: Bools, jumps: Ints) -> float:
+def _length_of_breaks(places: Real, faces: Whole, crossed: Bools, jumps: Whole) -> float:
     """Total length of the lines along which a field breaks, in the unit of the positions.
 
     Within a triangle a line joins the middles of the edges along which the field turns; from one
@@ -94,7 +93,7 @@ def _length_of_breaks(places: Floats, faces: Ints, crossed: Bools, jumps: Ints) 
     return float(length[line[part]].sum())
 
 
-def _shares(corners: Floats, crossed: Bools, middles: Floats) -> Floats:
+def _shares(corners: Real, crossed: Bools, middles: Real) -> Real:
     """Length of the line in a triangle that falls to each of its crossed edges."""
     owner = np.nonzero(crossed)[0]
     meeting = corners.mean(axis=1)
@@ -223,11 +222,11 @@ class TangentReport:
 
 
 def check_tangents(
-    positions: Floats,
-    normals: Floats | None,
-    uv: Floats | None,
-    faces: Ints,
-    orientation: Floats | None = None,
+    positions: Real,
+    normals: Real | None,
+    uv: Real | None,
+    faces: Whole,
+    orientation: Real | None = None,
 ) -> TangentReport:
     """Judge the direction of a patch on a mesh, as Mitsuba will compute it.
 
@@ -279,7 +278,7 @@ def check_tangents(
     )
 
 
-def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:
+def carried(vectors: Real, before: Real, after: Real) -> Real:
     """Turn vectors (n, 3) by the smallest rotation of one unit normal to another (Rodrigues)."""
     axis = np.cross(before, after)
     cosine = (before * after).sum(axis=1, keepdims=True)
@@ -288,8 +287,8 @@ def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:
 
 
 def _jumps(
-    welded: Ints, normals: Floats, tangent: Floats, turn: Floats, good: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], Ints]:
+    welded: Whole, normals: Real, tangent: Real, turn: Real, good: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], Whole]:
     """Find edges across which the direction jumps, apart from the fold of the surface.
 
     Parameters
@@ -331,7 +330,7 @@ def _jumps(
     return marked, edges[first[cosine < np.cos(np.radians(BREAK))]]
 
 
-def _laid(tangent: Floats, normal: Floats, turn: Floats) -> Floats:
+def _laid(tangent: Real, normal: Real, turn: Real) -> Real:
     """Turn unit tangents (n, 3) by (cosine, sine) (n, 2), counter-clockwise around normals."""
     cosine, sine = np.split(unit(turn), 2, axis=-1)
     return cosine * tangent + sine * np.cross(normal, tangent)

@@ -9,10 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real, Whole
 from ...errors import DiffractionError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: Angle (rad) between the sides of an edge from which on it is sharp, if the sides have vertices of
 #: their own there, as a box has where its texture is cut.
@@ -26,13 +24,13 @@ class TriangleMesh:
     """Vertices with normals and texture coordinates, and the triangles between them."""
 
     # positions, normals: (n, 3) floats; normals are unit vectors
-    positions: Floats
-    normals: Floats
-    uv: Floats  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
-    faces: Ints  # (m, 3) integers, counter-clockwise seen from outside
+    positions: Real
+    normals: Real
+    uv: Real  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
+    faces: Whole  # (m, 3) integers, counter-clockwise seen from outside
     # (n, 2) floats or None Cosine and sine of the angle by which the patch is turned away from
     # dp/du
-    orientation: Floats | None = None
+    orientation: Real | None = None
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -56,24 +54,24 @@ class TriangleMesh:
         return TriangleMesh(positions, normals, uv, faces.reshape(-1, 3), turns)
 
 
-def cell_corners(grid: Ints) -> tuple[Ints, ...]:
+def cell_corners(grid: Whole) -> tuple[Whole, ...]:
     """The four corners of every cell of a grid of vertex numbers, in the sense of rotation."""
     corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
     return tuple(corner.ravel() for corner in corners)
 
 
-def grid_faces(grid: Ints) -> Ints:
+def grid_faces(grid: Whole) -> Whole:
     """Two triangles for every cell of a grid of vertex numbers."""
     a, b, c, d = cell_corners(grid)
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def across(corners: Floats) -> Floats:
+def across(corners: Real) -> Real:
     """Normals (m, 3) of triangles (m, 3, 3), twice as long as their areas are large."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def vertex_normals(positions: Floats, faces: Ints, uv: Floats | None = None) -> Floats:
+def vertex_normals(positions: Real, faces: Whole, uv: Real | None = None) -> Real:
     """Return smooth unit normals (n, 3): the mean over the triangles at a vertex.
 
     Triangles count by their angles there (Thürmer and Wüthrich 1998, *Computing vertex normals from
@@ -95,7 +93,7 @@ def vertex_normals(positions: Floats, faces: Ints, uv: Floats | None = None) -> 
     return np.where(total.any(axis=1, keepdims=True), unit(total), [0.0, 0.0, 1.0])[vertex]
 
 
-def _shared(normals: Floats, places: Ints) -> Floats:
+def _shared(normals: Real, places: Whole) -> Real:
     """Return the sum of the normals at each vertex's place that are within `CREASE` of its own."""
     order = np.argsort(places, kind="stable")
     counts = np.bincount(places)
@@ -134,12 +132,12 @@ class TextureTangents(NamedTuple):
     area : (m,) signed areas in (u, v).
     """
 
-    dp_du: Floats
-    dp_dv: Floats
-    area: Floats
+    dp_du: Real
+    dp_dv: Real
+    area: Real
 
 
-def texture_tangents(sides: Floats, uv_sides: Floats) -> TextureTangents:
+def texture_tangents(sides: Real, uv_sides: Real) -> TextureTangents:
     """Return the tangents of triangles from two sides of each, in space and in (u, v).
 
     Solves sides = uv_sides · (dp/du, dp/dv); where (u, v) span no area the result is zero.
@@ -153,7 +151,7 @@ def texture_tangents(sides: Floats, uv_sides: Floats) -> TextureTangents:
 
 
 def oriented_mesh(
-    positions: Floats, normals: Floats, faces: Ints, directions: Floats, uv: Floats | None = None
+    positions: Real, normals: Real, faces: Whole, directions: Real, uv: Real | None = None
 ) -> TriangleMesh:
     """A mesh on which the patch's x axis follows one direction per vertex.
 
@@ -198,7 +196,7 @@ def oriented_mesh(
     )
 
 
-def _unrolled(corners: Floats, normals: Floats, wanted: Floats) -> tuple[Floats, Floats]:
+def _unrolled(corners: Real, normals: Real, wanted: Real) -> tuple[Real, Real]:
     """Coordinates (m, 3, 2) in the plane of each triangle, and their u axis (m, 3)."""
     sides = corners[:, 1:] - corners[:, :1]
     flat = np.cross(sides[:, 0], sides[:, 1])
@@ -215,12 +213,12 @@ def _unrolled(corners: Floats, normals: Floats, wanted: Floats) -> tuple[Floats,
     return np.stack(coordinates, axis=2), axis
 
 
-def tangential(vectors: Floats, normals: Floats) -> Floats:
+def tangential(vectors: Real, normals: Real) -> Real:
     """Unit vectors along the part of `vectors` at right angles to `normals`; zero stays zero."""
     return unit(vectors - (vectors * normals).sum(axis=-1, keepdims=True) * normals)
 
 
-def unit(vectors: Floats) -> Floats:
+def unit(vectors: Real) -> Real:
     """Normalise vectors (…, 3); zero vectors stay zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1.0)

@@ -16,8 +16,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...optics.colour import linear_srgb
 from ...plugin.description import Surface, describe
@@ -29,7 +29,6 @@ from ...tables.table import DiffractionTable
 from ..elements import own_id, parts_of
 from ..load import shrink
 
-Reals = NDArray[np.float64]
 Load = Callable[[], Any]
 
 #: Longest paths that are followed, vertices and camera included.
@@ -68,9 +67,9 @@ class TableLight:
     table: DiffractionTable
     surfaces: tuple[str, ...]
     total: float
-    frequency: Reals
-    kappa: Reals
-    wavelength: Reals
+    frequency: Real
+    kappa: Real
+    wavelength: Real
     lobe_turn: float
 
     @property
@@ -79,7 +78,7 @@ class TableLight:
         return float(self.frequency.sum()) / self.total if self.total > 0.0 else 0.0
 
     @property
-    def edges(self) -> tuple[Reals, Reals]:
+    def edges(self) -> tuple[Real, Real]:
         """Upper ends (BINS,), (BINS, 1) of the bins along |α| and |β|, rad/µm."""
         ends = self.table.q_limit / BINS * np.arange(1.0, BINS + 1.0)
         return ends, ends[:, None]
@@ -229,7 +228,7 @@ def _render(scene: Any, sensor: Any, paths: int, seed: int, made: list[_Factors]
     )  # fmt: skip
 
 
-def _brightness(film: Any, channels: int) -> Reals:
+def _brightness(film: Any, channels: int) -> Real:
     """Return the weights (channels,) of a film's channels in X + Y + Z; of bands all are alike."""
     kind = film.bitmap().pixel_format().name
     if not kind.startswith(("RGB", "XYZ", "Y")):

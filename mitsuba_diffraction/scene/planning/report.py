@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import Real
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...tables.table import DiffractionTable
-from .light import BINS, WAVELENGTHS, Reals
+from .light import BINS, WAVELENGTHS
 from .plan import PlannedTable, quantiles
 
 
@@ -56,7 +57,7 @@ def describe(planned: PlannedTable) -> dict[str, Any]:
     }
 
 
-def wavelengths_needed(light: Reals, share: float = 1e-3) -> dict[str, Any]:
+def wavelengths_needed(light: Real, share: float = 1e-3) -> dict[str, Any]:
     """Return the band that all but a share of the diffracted light lies in, half on either side.
 
     light : (470,) between `WAVELENGTHS`, in X + Y + Z.

@@ -22,6 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...heights.coherence import SHARPENING, TAPER, window_corners, window_places
 from ...heights.field import HeightField
 from ...heights.preprocess import plane_of
@@ -37,7 +38,6 @@ _GREEN = 550.0  # nm, where the standard error is stated
 #: Points of a scan that a batch of windows lies in, at most, unless one window is larger.
 BATCH_POINTS = 2**24
 
-Reals = NDArray[np.float64]
 #: As `map`: calls of a function, here or on workers, results in the order of the arguments.
 Run = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
@@ -54,7 +54,7 @@ class _Axis:
 
     starts: Sequence[int]
     length: int
-    taper: Reals | None
+    taper: Real | None
 
     @classmethod
     def of(cls, pixels: int, window: float) -> _Axis:
@@ -64,7 +64,7 @@ class _Axis:
         taper = 1.0 + sum(c * np.cos(n * turn) for n, c in enumerate(TAPER, 1))
         return cls(starts, length, taper / np.sqrt(np.mean(taper**2)))
 
-    def alike(self) -> Reals:
+    def alike(self) -> Real:
         """Share that the powers of two windows have in common, by how many steps they are apart."""
         count = len(self.starts)
         if count == 1 or self.taper is None:
@@ -260,7 +260,7 @@ class Screens:
         return powers
 
     @property
-    def taper(self) -> Reals:
+    def taper(self) -> Real:
         """Factor by which screens fade towards the edges: (ny or 1, nx or 1)."""
         return np.outer(*(np.ones(1) if t is None else t for t in self.tapers))
 
@@ -288,7 +288,7 @@ def _pairs(along_y: _Axis, along_x: _Axis) -> float:
 
 def _scatter(
     last: tuple[int, int], kappa: float, lobe: Sequence[float], windows: Screens
-) -> tuple[int, Reals, Reals]:
+) -> tuple[int, Real, Real]:
     """Number of windows, mean and sum of squared deviations of what look-ups find in them."""
     mean, squares = np.zeros(1), np.zeros(1)
     for n in range(len(windows)):

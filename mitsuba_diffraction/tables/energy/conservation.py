@@ -20,8 +20,9 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import Real, Single
 from ...optics.paths import Path
-from ..directional import Array, DirectionalTable, DirectionGrid, Real
+from ..directional import DirectionalTable, DirectionGrid
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import Record, cached, key_of
 from ..table import DiffractionTable
@@ -152,7 +153,7 @@ class SurfaceEnergy:
 
     def albedos(
         self, conservation: Conservation, theta: Real, phi: Real, wavelength: float
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Single, Single]:
         """Return the light sent on as it is and conserved, (sides, t, p) each, at angles (rad).
 
         Exact sums at these directions and a wavelength (nm), not the grid's, as a furnace measures
@@ -196,7 +197,7 @@ class SurfaceEnergy:
         table = DirectionalTable(wavelengths, albedos[:, : len(coarse.theta)])
         return table, float(albedos.max())
 
-    def _solved(self, light: ScatteredLight) -> Array:
+    def _solved(self, light: ScatteredLight) -> Single:
         """Find s at the grid's directions."""
         settings = self._settings
         albedo = light.sent(self._ones)
@@ -209,7 +210,7 @@ class SurfaceEnergy:
         largest = np.interp(np.degrees(self._grid.theta), (70.0, 80.0), (settings.largest, end))
         return scaled(light.sums, aim, largest[:, None], settings.sweeps)
 
-    def _lower_between(self, nodes: Real, place: float, parts: int, calm: float, s: Array) -> None:
+    def _lower_between(self, nodes: Real, place: float, parts: int, calm: float, s: Single) -> None:
         """Lower s for light at a place between all neighbouring wavelengths.
 
         calm : see `EnergySettings`; 0 for a close look at all light.

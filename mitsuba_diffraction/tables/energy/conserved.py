@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...optics import boundary, through
 from ...optics.fresnel import Filmed
 from ...optics.paths import ABOVE, Path, Returned, Side
 from ...optics.stack import Stacked
-from ..directional import Real
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | Stacked | None"]

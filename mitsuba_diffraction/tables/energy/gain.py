@@ -11,11 +11,11 @@ from functools import cached_property
 import numpy as np
 import scipy
 
+from ...arrays import Real
 from ...optics.blend import RoughnessTable
 from ...optics.boundary import Heights, model_of
 from ...optics.fresnel import Filmed
 from ...optics.paths import Path
-from ..directional import Real
 
 #: Polar angles of both directions, and azimuths between them, of tables of G.
 POLAR, AZIMUTHS = 37, 25

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..directional import Array, Real
+from ...arrays import Real, Single
 
 Floats = NDArray[np.floating[Any]]
 
@@ -20,7 +20,7 @@ _MIN_SUM = np.float32(1e-6)
 
 def scaled(
     transport: Callable[[Any], Floats], aim: Floats, largest: Real | float, sweeps: int
-) -> Array:
+) -> Single:
     """Return s such that s Ms is `aim`, by the iteration of Sinkhorn and Knopp (1967).
 
     transport : M, a symmetric kernel's sums for weights on a grid.
@@ -35,12 +35,12 @@ def scaled(
     return s
 
 
-def weighted(pages: Array, shares: Real) -> Array:
+def weighted(pages: Single, shares: Real) -> Single:
     """Return the mean of pages (n, …) by shares (n,)."""
     return np.einsum("n,n...->...", shares.astype(np.float32), pages)
 
 
-def lowered(pages: Array, shares: Real, excess: Callable[[Array], Array], passes: int) -> Array:
+def lowered(pages: Single, shares: Real, excess: Callable[[Single], Single], passes: int) -> Single:
     """Return pages (n, sides, polar + 1, azimuthal) lowered until no light between exceeds 1.
 
     shares : (n,), of the pages in the light between.
@@ -56,7 +56,7 @@ def lowered(pages: Array, shares: Real, excess: Callable[[Array], Array], passes
     return pages
 
 
-def _largest_around(factors: Array, azimuthal: int) -> Array:
+def _largest_around(factors: Single, azimuthal: int) -> Single:
     """Return at each vertex the largest factor, or 1, in the parts of the cells around it."""
     parts = factors.shape[-1] // azimuthal
     cells = factors.reshape(len(factors), -1, parts, azimuthal, parts).max(axis=(2, 4))

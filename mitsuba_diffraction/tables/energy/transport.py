@@ -24,10 +24,11 @@ from functools import partial
 import numpy as np
 import scipy
 
+from ...arrays import Real, Single
 from ...optics.geometry import wavenumber
 from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
 from ...optics.paths import Path
-from ..directional import Array, DirectionGrid, LinearMap, Quadrature, Real, quadrature
+from ..directional import DirectionGrid, LinearMap, Quadrature, quadrature
 from ..order_mixture import NARROW, order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
@@ -131,7 +132,7 @@ class Transport:
         self._per_w = above / orders.densest
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
         self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
-        self._parts: list[Callable[[Array], Array]] = [self._order_0(theta, phi, grid)]
+        self._parts: list[Callable[[Single], Single]] = [self._order_0(theta, phi, grid)]
         if orders.has_weak:
             half, nodes = grid.half, orders.nodes
             shares = self._weak_shares(half.theta, half.phi)
@@ -141,7 +142,7 @@ class Transport:
         if orders.strong:
             self._parts.append(self._strong(theta, phi, grid))
 
-    def __call__(self, s: Array) -> Array:
+    def __call__(self, s: Single) -> Single:
         """Return the light of all orders for weights on the grid, (t, p)."""
         return np.asarray(sum(part(s) for part in self._parts), np.float32)
 
@@ -154,7 +155,7 @@ class Transport:
         """Return κ over the height scale and `ScatteredOrders.densest`."""
         return self._per_w * np.maximum(self._path.width(cos_i, cos_o), self._path.least)
 
-    def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:
+    def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the light of order 0."""
         if self._width_0 > _WIDE:
             nodes = self._orders.nodes_within(self._path.left.critical_sine)
@@ -202,7 +203,7 @@ class Transport:
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(np.asarray(parts, np.float32)).matrix.toarray()
 
-    def _weak_shares(self, theta: Real, phi: Real) -> Array:
+    def _weak_shares(self, theta: Real, phi: Real) -> Single:
         """Return shares (t, p, n) of the quadrature's directions, at azimuths turned by phi."""
         mixture, k, nodes = self._orders.mixture, self._k, self._orders.nodes
         cos_i, sine = self._start(theta[:, None])
@@ -236,7 +237,7 @@ class Transport:
                 page += flat.take(index + rows * columns) * of_upper[n]
         return shares
 
-    def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Array], Array]:
+    def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the light of the strong orders."""
         rows = max(1, _PAIRS // (len(phi) * self._orders.strong))
         parts = [
@@ -288,17 +289,17 @@ class ScatteredLight:
     paths: list[Transport]
     here: LinearMap
 
-    def sums(self, weights: Array) -> Array:
+    def sums(self, weights: Single) -> Single:
         """Return the light of all orders for weights."""
         sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
         for path in self.paths:
             sums[path.came] += path(weights[path.left])
         return sums
 
-    def sent(self, s: Array) -> Array:
+    def sent(self, s: Single) -> Single:
         """Return the light of all orders, scaled by s at both ends."""
         return self.at_directions(s) * self.sums(s)
 
-    def at_directions(self, scale: Array) -> Array:
+    def at_directions(self, scale: Single) -> Single:
         """Interpolate a scale to the directions, (sides, t, p)."""
         return np.stack([self.here(side) for side in scale])

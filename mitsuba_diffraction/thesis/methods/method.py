@@ -28,6 +28,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError, check_choice
 from ...optics.colour import linear_srgb, response
 from ...optics.geometry import diffraction_coordinates, kirchhoff_factor, wavenumber
@@ -36,7 +37,6 @@ from ...tables.table import DiffractionTable
 
 SHADOWINGS = ("none", "vcavity")
 
-Array = NDArray[np.float64]
 #: Wavelength whose value sets the brightness of white around the mirror direction, nm: the eye's
 #: sensitivity is largest there.
 SPECULAR_WAVELENGTH = 555.0
@@ -104,7 +104,7 @@ class Method(ABC):
     wavelength_range: tuple[float, float]
 
     @abstractmethod
-    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+    def window_sum(self, wi: Real, wo: Real, wavelength: Real) -> Real:
         """Return S = ⟨|P|²⟩/(2πσ²)², shape (n,), dimensionless: 1 in a flat mirror's direction.
 
         Parameters
@@ -114,14 +114,14 @@ class Method(ABC):
         """
 
     @abstractmethod
-    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+    def samples(self, wi: Real, wo: Real) -> Iterator[tuple[Real, Real]]:
         """Yield wavelengths (n,) and their weights (n,), both nm; weight 0 excludes a pair."""
 
-    def white_pairs(self, wi: Array, wo: Array) -> NDArray[np.bool_]:
+    def white_pairs(self, wi: Real, wo: Real) -> NDArray[np.bool_]:
         """Return the pairs (n,) whose colour is white, as bright as at `SPECULAR_WAVELENGTH`."""
         return np.zeros(len(wi), bool)
 
-    def brdf(self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Array:
+    def brdf(self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Real:
         """Return the BRDF f = (1 + ωi·ωo)²·4πσ²·S / (λ² w² cosθi cosθo) in 1/sr, shape (n,).
 
         `FullSpectrum` has the mirror's lobe as order 0 (`tables.lookup.brdf`).
@@ -132,7 +132,7 @@ class Method(ABC):
 
     def relative(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None
-    ) -> Array:
+    ) -> Real:
         """Return the thesis' relative reflectance ρ = C·S (see `Gain`), shape (n,)."""
         return self._value(wi, wo, wavelength, gain or Gain())
 
@@ -143,7 +143,7 @@ class Method(ABC):
         *,
         gain: Gain | None = None,
         progress: Progress | None = None,
-    ) -> Array:
+    ) -> Real:
         """Return X, Y, Z under D65, (n, 3): Σ value·s̄(λ)·weight over the method's wavelengths.
 
         s̄ = S_D65·(x̄, ȳ, z̄)/∫S_D65·ȳ dλ (`colour.response`), so that a value that does not depend on
@@ -171,14 +171,14 @@ class Method(ABC):
                     progress(done + 1, len(starts), f"evaluating {self.name}")
         return result
 
-    def linear_srgb(self, wi: ArrayLike, wo: ArrayLike, **options: Any) -> Array:
+    def linear_srgb(self, wi: ArrayLike, wo: ArrayLike, **options: Any) -> Real:
         """Return `xyz` in linear sRGB, (n, 3); components outside the gamut are negative.
 
         options : of `xyz`.
         """
         return np.asarray(linear_srgb(self.xyz(wi, wo, **options)), np.float64)
 
-    def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
+    def _xyz(self, wi: Real, wo: Real, gain: Gain | None) -> Real:
         """Return X, Y, Z of pairs above the surface."""
         total = np.zeros((len(wi), 3))
         white = self.white_pairs(wi, wo)
@@ -195,14 +195,14 @@ class Method(ABC):
             total[on] += value[:, None] * response(lam)
         return total
 
-    def _white(self) -> Array:
+    def _white(self) -> Real:
         """Return X, Y, Z (3,) of a reflectance of 1 over the method's range."""
         lam = np.arange(self.wavelength_range[0], self.wavelength_range[1] + 0.5)
         return np.asarray(scipy.integrate.trapezoid(response(lam), lam, axis=0))
 
     def _value(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None
-    ) -> Array:
+    ) -> Real:
         """Check directions and wavelengths; return f, or ρ with a gain factor, (n,)."""
         incident, outgoing = self._pairs(wi, wo)
         lam = np.broadcast_to(np.asarray(wavelength, float), len(incident))
@@ -213,7 +213,7 @@ class Method(ABC):
         result[above] = self._scaled(incident[above], outgoing[above], lam[above], gain)
         return result
 
-    def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+    def _scaled(self, wi: Real, wo: Real, wavelength: Real, gain: Gain | None) -> Real:
         """Return f, or ρ with a gain factor, (n,), of pairs above the surface."""
         s = self.window_sum(wi, wo, wavelength)
         if gain is not None:
@@ -222,7 +222,7 @@ class Method(ABC):
         return kirchhoff_factor(wi, wo, wavelength, self.sigma) * (np.pi * self.sigma**2 * area) * s
 
     @staticmethod
-    def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Array, Array]:
+    def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:
         """Check directions and broadcast them to (n, 3)."""
         incident, outgoing = (np.atleast_2d(np.asarray(d, float)) for d in (wi, wo))
         try:
@@ -242,15 +242,15 @@ class UniformMethod(Method):
     wavelengths, weights : nodes and weights of the trapezoidal rule, (n,), nm.
     """
 
-    wavelengths: Array
-    weights: Array
+    wavelengths: Real
+    weights: Real
 
     def _sum_over(self, wavelength_range: tuple[float, float], step: float) -> None:
         """Set the grid of wavelengths."""
         self.wavelength_range = wavelength_range
         self.wavelengths, self.weights = trapezoid_rule(wavelength_range, step)
 
-    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+    def samples(self, wi: Real, wo: Real) -> Iterator[tuple[Real, Real]]:
         """Yield every wavelength of the grid for all pairs."""
         ones = np.ones(len(wi))
         for wavelength, weight in zip(self.wavelengths, self.weights, strict=True):
@@ -337,13 +337,13 @@ class FullSpectrum(UniformMethod):
                 f"shortest wavelength, {table.wavelength_range[0]:g} nm; build a table for it"
             )
 
-    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+    def window_sum(self, wi: Real, wo: Real, wavelength: Real) -> Real:
         """Return S from the table."""
         k = wavenumber(wavelength)
         u, v, w = diffraction_coordinates(wi, wo)
         return self.table.window_sum(k * u, k * v, k * w)
 
-    def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+    def _scaled(self, wi: Real, wo: Real, wavelength: Real, gain: Gain | None) -> Real:
         """Return f of the table, or ρ with a gain factor."""
         if gain is None:
             return self.table.brdf(wi, wo, wavelength)

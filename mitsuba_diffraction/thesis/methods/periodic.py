@@ -12,13 +12,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...errors import DiffractionError, check_choice
 from ...optics.colour import response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...tables.build.spectrum import GLOSSY_RADIUS
 from ...tables.lookup import Kernel, order_0_sum, weighted_sum
 from ...tables.table import DiffractionTable
-from .method import SPECULAR_WAVELENGTH, Array, FullSpectrum, Gain, Method, UniformMethod
+from .method import SPECULAR_WAVELENGTH, FullSpectrum, Gain, Method, UniformMethod
 from .periods import Period
 
 #: Choices of `weights` in `OrdersOnly`, and of `interpolation` in `Repeated`.
@@ -76,19 +77,19 @@ class OrdersOnly(Method):
             raise DiffractionError(f"specular={self.specular:g} must be at least 0 and below 2")
         self._step = float(np.diff(full.wavelengths).max())
 
-    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+    def window_sum(self, wi: Real, wo: Real, wavelength: Real) -> Real:
         """Return S of `flss` at sampled wavelengths, and 0 at others."""
         sampled = self._sampled(wi, wo, wavelength)
         result = np.zeros(len(wi))
         result[sampled] = self.full.window_sum(wi[sampled], wo[sampled], wavelength[sampled])
         return result
 
-    def white_pairs(self, wi: Array, wo: Array) -> NDArray[np.bool_]:
+    def white_pairs(self, wi: Real, wo: Real) -> NDArray[np.bool_]:
         """Return the pairs within ε of the mirror direction."""
         u, v, _ = diffraction_coordinates(wi, wo)
         return np.asarray(np.hypot(u, v) < self.specular)
 
-    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+    def samples(self, wi: Real, wo: Real) -> Iterator[tuple[Real, Real]]:
         """Yield λₙ and Δλₙ, order by order, first along x and then along y."""
         u, v, _ = diffraction_coordinates(wi, wo)
         for period, frequency in zip(self.periods, (u, v), strict=True):
@@ -96,7 +97,7 @@ class OrdersOnly(Method):
                 for _, lam, in_range in _orders(period, frequency, self.wavelength_range):
                     yield lam, np.where(in_range, self._width(lam, frequency), 0.0)
 
-    def _sampled(self, wi: Array, wo: Array, wavelength: Array) -> NDArray[np.bool_]:
+    def _sampled(self, wi: Real, wo: Real, wavelength: Real) -> NDArray[np.bool_]:
         """Return whether a λₙ is within half a step, or the pair is near the mirror direction."""
         u, v, _ = diffraction_coordinates(wi, wo)
         sampled = np.hypot(u, v) < self.specular
@@ -107,7 +108,7 @@ class OrdersOnly(Method):
                 sampled |= np.abs(path / nearest - wavelength) <= 0.5 * self._step
         return np.asarray(sampled)
 
-    def _width(self, wavelength: Array, frequency: Array) -> Array:
+    def _width(self, wavelength: Real, frequency: Real) -> Real:
         """Return Δλₙ in nm."""
         if self.weighting == "step":
             return np.full(len(wavelength), self._step)
@@ -116,8 +117,8 @@ class OrdersOnly(Method):
 
 
 def _orders(
-    period: float, frequency: Array, wavelength_range: tuple[float, float]
-) -> Iterator[tuple[int, Array, NDArray[np.bool_]]]:
+    period: float, frequency: Real, wavelength_range: tuple[float, float]
+) -> Iterator[tuple[int, Real, NDArray[np.bool_]]]:
     """Yield the orders of a period in µm at frequencies (n,).
 
     Each is the order n, its wavelengths λₙ (n,) in nm, and whether they are in the range.
@@ -188,19 +189,19 @@ class Repeated(UniformMethod):
         self.sigma = float(np.sqrt(self.area / (4.0 * np.pi)))
         self._sum_over(wavelength_range, step)
 
-    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+    def window_sum(self, wi: Real, wo: Real, wavelength: Real) -> Real:
         """Return S = |B|²·D₁²·D₂²."""
         k = wavenumber(wavelength)
         u, v, w = diffraction_coordinates(wi, wo)
         at, kernels = (self.table, k * u, k * v, k * w), (self._kernel, self._kernel)
         amplitude = weighted_sum(*at, kernels, self._taps) + order_0_sum(*at, kernels)
-        power: Array = np.abs(amplitude) ** 2
+        power: Real = np.abs(amplitude) ** 2
         for frequency, spacing, n in zip((u, v), self.table.spacing, self.repeats, strict=True):
             power = power * copies(k * frequency / spacing, n) ** 2
         return power
 
 
-def copies(x: Array, n: int) -> Array:
+def copies(x: Real, n: int) -> Real:
     """Return D = |sin(πnx)/(n sin(πx))| at positions x in bins, 1 at whole numbers.
 
     x is reduced to the nearest whole number first, which keeps both sines exact.
@@ -211,7 +212,7 @@ def copies(x: Array, n: int) -> Array:
     return np.where(small, 1.0, np.abs(np.sin(np.pi * n * fraction) / np.where(small, 1.0, below)))
 
 
-def _tent(distance: Array) -> Array:
+def _tent(distance: Real) -> Real:
     """Return the weight 1 − |distance| of linear interpolation."""
     return np.maximum(0.0, 1.0 - np.abs(distance))
 
@@ -251,7 +252,7 @@ class Rainbow(Method):
         self.wavelength_range = wavelength_range
         self._density = 2.0 * math.sqrt(math.pi) * self.sigma / period.length
 
-    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+    def window_sum(self, wi: Real, wo: Real, wavelength: Real) -> Real:
         """Return the comb (2√π σ/d) Σ_n exp(−σ²(k|u| − 2πn/d)²), of mean 1 over frequency."""
         line = self._frequency(wi, wo) * wavenumber(wavelength) * self.period.length / (2 * np.pi)
         sharpness = (2.0 * np.pi * self.sigma / self.period.length) ** 2
@@ -261,13 +262,13 @@ class Rainbow(Method):
         lines = np.exp(-sharpness * (line[:, None] - offsets) ** 2)
         return self._density * lines.sum(axis=1)
 
-    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+    def samples(self, wi: Real, wo: Real) -> Iterator[tuple[Real, Real]]:
         """Yield λₙ and the gaps between them, λₙ²/(d|u|)."""
         frequency = self._frequency(wi, wo)
         for n, lam, in_range in _orders(self.period.length, frequency, self.wavelength_range):
             yield lam, np.where(in_range, lam / n, 0.0)
 
-    def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
+    def _xyz(self, wi: Real, wo: Real, gain: Gain | None) -> Real:
         self._refuse(gain)
         total = np.zeros((len(wi), 3))
         for wavelength, gap in self.samples(wi, wo):
@@ -276,11 +277,11 @@ class Rainbow(Method):
         total += (self._density * np.exp(-(spread**2)))[:, None] * self._white()
         return total / np.pi
 
-    def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+    def _scaled(self, wi: Real, wo: Real, wavelength: Real, gain: Gain | None) -> Real:
         self._refuse(gain)
         return self.window_sum(wi, wo, wavelength) / np.pi
 
-    def _frequency(self, wi: Array, wo: Array) -> NDArray[np.float64]:
+    def _frequency(self, wi: Real, wo: Real) -> NDArray[np.float64]:
         """Return |u| along x, or |v| along y, (n,)."""
         u, v, _ = diffraction_coordinates(wi, wo)
         return np.abs(u if self.period.axis == "x" else v)

@@ -17,13 +17,13 @@ from scipy.optimize import least_squares
 
 from ...analysis.maps.hemisphere import polar
 from ...analysis.maps.result import LightDirection
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...optics.geometry import wavenumber
 from ...progress import Progress
 
-Array = NDArray[np.float64]
 #: brdf(wi, wo, wavelength) in 1/sr for (n, 3), (n, 3) and (n,) nm.
-Brdf = Callable[[Array, Array, Array], Array]
+Brdf = Callable[[Real, Real, Real], Real]
 
 #: Largest number of values in a response: 160 MB.
 MOST_POINTS = 20_000_000
@@ -56,11 +56,11 @@ class Beam(LightDirection):
         """Sine of the angle of incidence, sinθi."""
         return math.sin(math.radians(self.theta))
 
-    def views(self, angles: Array) -> Array:
+    def views(self, angles: Real) -> Real:
         """Return ωo (n, 3) of viewing angles in degrees, positive away from the light."""
         return polar(-np.radians(angles), math.radians(self.phi))
 
-    def grating_angles(self, wavelength: Array, period: float, order: int) -> Array:
+    def grating_angles(self, wavelength: Real, period: float, order: int) -> Real:
         """Return the viewing angles with sinθo = sinθi − mλ/d, degrees, or NaN without an order.
 
         Parameters
@@ -78,10 +78,10 @@ class Response:
     """Angle-resolved scatter of a patch, by wavelength and viewing angle."""
 
     beam: Beam
-    wavelengths: Array  # (L,), nm
-    angles: Array  # (A,), degrees, ascending
+    wavelengths: Real  # (L,), nm
+    angles: Real  # (A,), degrees, ascending
     # (L, A), f·cosθo in 1/sr: share of the beam's power per solid angle at a small detector
-    values: Array
+    values: Real
     sigma: float  # σ of the window, µm, which sets the width of order 0
     label: str  # name of the method
 
@@ -89,8 +89,8 @@ class Response:
 def measure(
     brdf: Brdf,
     beam: Beam,
-    wavelengths: Array,
-    angles: Array,
+    wavelengths: Real,
+    angles: Real,
     *,
     sigma: float,
     label: str,
@@ -113,7 +113,7 @@ def measure(
     return Response(beam, wavelengths, angles, values, sigma, label)
 
 
-def check_axes(wavelengths: Array, angles: Array) -> None:
+def check_axes(wavelengths: Real, angles: Real) -> None:
     """Refuse axes with too few or too many values, or with values out of range."""
     if wavelengths.size < 2 or angles.size < 8:
         raise DiffractionError(
@@ -137,8 +137,8 @@ class Ridge:
 
     response: Response
     order: int
-    angles: Array  # (L,), degrees; NaN without a maximum
-    heights: Array  # (L,), f·cosθo at the maximum, 1/sr
+    angles: Real  # (L,), degrees; NaN without a maximum
+    heights: Real  # (L,), f·cosθo at the maximum, 1/sr
 
     @property
     def has_maximum(self) -> NDArray[np.bool_]:
@@ -146,11 +146,11 @@ class Ridge:
         return np.isfinite(self.angles)
 
     @property
-    def frequency(self) -> Array:
+    def frequency(self) -> Real:
         """Coordinate |u| = |sinθi − sinθo| of the maxima, (L,)."""
         return np.abs(self.response.beam.sine - np.sin(np.radians(self.angles)))
 
-    def grating_angles(self, period: float) -> Array:
+    def grating_angles(self, period: float) -> Real:
         """Return the angles of the grating equation for a period in µm, (L,), degrees."""
         return self.response.beam.grating_angles(self.response.wavelengths, period, self.order)
 
@@ -250,7 +250,7 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
     return float(periods[np.where(strong, share, 0.0).argmax()])
 
 
-def _contrast(lines: Array, light: Array, sigma: float) -> tuple[Array, Array]:
+def _contrast(lines: Real, light: Real, sigma: float) -> tuple[Real, Real]:
     """Return the contrast of a lobe around each of `lines` (n,).
 
     Returns
@@ -261,7 +261,7 @@ def _contrast(lines: Array, light: Array, sigma: float) -> tuple[Array, Array]:
     edges = np.append(lines, lines[-1] + step) - 0.5 * step
     total = np.append(0.0, np.cumsum(light)) * step
 
-    def within(low: Array, high: Array) -> tuple[Array, Array]:
+    def within(low: Real, high: Real) -> tuple[Real, Real]:
         """Integrate the light from `low` to `high`; also return the clipped width."""
         low, high = np.clip(low, edges[0], edges[-1]), np.clip(high, edges[0], edges[-1])
         return np.interp(high, edges, total) - np.interp(low, edges, total), high - low
@@ -275,7 +275,7 @@ def _contrast(lines: Array, light: Array, sigma: float) -> tuple[Array, Array]:
     return lobe / max(total[-1], 1e-300), lobe / width / beside
 
 
-def _frequencies(response: Response, order: int) -> Array:
+def _frequencies(response: Response, order: int) -> Real:
     """Return u = sinθi − sinθo (A,), positive on the side of an order."""
     if order == 0:
         raise DiffractionError(
@@ -322,7 +322,7 @@ def fit_period(ridge: Ridge) -> Fit:
     )
 
 
-def _error(ridge: Ridge, abscissa: Array, u: Array, period: float) -> float:
+def _error(ridge: Ridge, abscissa: Real, u: Real, period: float) -> float:
     """Return the error of a period fitted to u over mλ, µm, the quadratic sum of two.
 
     Scatter: the standard error of the slope u over mλ (least squares). Slope: where the brightness

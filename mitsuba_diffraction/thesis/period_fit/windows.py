@@ -14,12 +14,13 @@ from functools import partial
 
 import numpy as np
 
+from ...arrays import Real
 from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from ..methods.method import Gain
-from .ridge import Array, Beam, Fit, fit_period, measure, ridge_of
+from .ridge import Beam, Fit, fit_period, measure, ridge_of
 
 #: Largest number of windows: each costs a whole response.
 MOST_WINDOWS = 4096
@@ -31,12 +32,12 @@ _SEED = 20140113
 class WindowFits:
     """Fits of single coherence windows."""
 
-    centres: Array  # (n, 2), centres of the windows, µm
+    centres: Real  # (n, 2), centres of the windows, µm
     fits: tuple[Fit | None, ...]  # one for each window; `None` with too few maxima
     independent: float  # number of windows on the patch that do not overlap, at least 1
 
     @property
-    def periods(self) -> Array:
+    def periods(self) -> Real:
         """Periods of the windows that have a fit, µm."""
         return np.array([fit.period for fit in self.fits if fit is not None])
 
@@ -59,8 +60,8 @@ class WindowFits:
 def window_fits(
     table: DiffractionTable,
     beam: Beam,
-    wavelengths: Array,
-    angles: Array,
+    wavelengths: Real,
+    angles: Real,
     *,
     count: int,
     order: int = 1,
@@ -101,7 +102,7 @@ def window_fits(
     return WindowFits(centres, tuple(fits), independent)
 
 
-def _lattice(count: int) -> Array:
+def _lattice(count: int) -> Real:
     """Return points (count, 2) in [0, 1)²: a rank-1 lattice by the plastic number, shifted."""
     plastic = 1.32471795724474602596
     steps = np.arange(count)[:, None] * np.array([1.0 / plastic, 1.0 / plastic**2])
@@ -109,7 +110,7 @@ def _lattice(count: int) -> Array:
 
 
 def thesis_fit(
-    table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array, order: int = 1
+    table: DiffractionTable, beam: Beam, wavelengths: Real, angles: Real, order: int = 1
 ) -> Fit:
     """Fit a period by the thesis' procedure, at viewing angles across the normal, from 0.
 
@@ -118,7 +119,7 @@ def thesis_fit(
     """
     gain, across = Gain(), angles[angles >= 0.0]
 
-    def relative(wi: Array, wo: Array, wavelength: Array) -> Array:
+    def relative(wi: Real, wo: Real, wavelength: Real) -> Real:
         """Return the relative reflectance C·S with the phase exp(ikh)."""
         k = wavenumber(wavelength)
         u, v, _ = diffraction_coordinates(wi, wo)
