@@ -104,9 +104,9 @@ def test_in_rgb_a_channel_has_the_boundary_of_one_wavelength() -> None:
 
 def test_gold_has_the_colour_of_its_spectrum(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nearer than with one reflectance a channel, which lines of light do not all share."""
+    mi.set_variant("llvm_ad_spectral" if runs("llvm_ad_spectral") else "scalar_spectral")
     wi, wo, *_ = lit()
     lines = np.arange(362.5, 780.0, 5.0, np.float32).reshape(-1, 4)
-    mi.set_variant("llvm_ad_spectral" if runs("llvm_ad_spectral") else "scalar_spectral")
     bsdf, truth = load(material="Au"), np.zeros((len(wi), 3))
     for group in lines if dr.is_jit_v(mi.Float) else []:
         si = interaction(wi, np.tile(group, (len(wi), 1)))
