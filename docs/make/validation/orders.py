@@ -131,7 +131,8 @@ class Case:
     def side_by_side(self, theta: float, phi: float) -> Row:
         """Return order 0 and the strongest other one, at `SHOWN`."""
         row = self._efficiencies(theta, phi, SHOWN)
-        strongest = int(np.argmax(np.where(row.coloured, row.truth, -1.0)))
+        # +m and −m of light in the plane of the grooves are equal but for rounding
+        strongest = int(np.argmax(np.where(row.coloured, row.truth.round(6), -1.0)))
         shown = [int(np.flatnonzero(row.order == 0)[0]), strongest]
         return Row(*(column[shown[: 1 + row.coloured[strongest]]] for column in row))
 
