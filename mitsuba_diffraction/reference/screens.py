@@ -38,7 +38,7 @@ Tapers = tuple[Real | None, Real | None]
 class Sigmas(NamedTuple):
     """σ under which all orders but 0 are summed, and σ₀ of order 0's, the light's; both in µm.
 
-    `windows`: width W of those of a scan, which does not tile the plane, µm.
+    `windows`: width W, µm, of the windows of a scan, which does not tile the plane.
     """
 
     orders: float

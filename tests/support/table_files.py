@@ -21,7 +21,7 @@ def document_in(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 class Contents:
-    """What is in a table's file, to be changed and written with a checksum that fits."""
+    """Content of a table's file, to be changed and written with a checksum that fits."""
 
     def __init__(self, path: Path) -> None:
         with OpenEXR.File(str(path), separate_channels=True) as exr:
@@ -29,7 +29,7 @@ class Contents:
             self.document = json.loads(exr.header()[TABLE_ATTRIBUTE])
 
     def write(self, path: Path) -> None:
-        """A file that nothing but what it says gives away."""
+        """Write a file in which only the content is wrong."""
         text = json.dumps(self.document)
         rows, columns = next(iter(self.channels.values())).shape
         # the order in which a reader goes through the channels

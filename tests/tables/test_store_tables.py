@@ -47,7 +47,7 @@ class Builder:
 
 
 def test_a_later_process_reads_it_from_disk_under_its_own_name(folder):
-    """The cache keeps no name of a file: whoever has equal heights is told their own."""
+    """The cache keeps no name of a file: a reader of equal heights gets the own file's name."""
     first = Builder(dataclasses.replace(PATCH, name="secret.npy")).table()
     (file,) = folder.iterdir()
     assert b"secret" not in file.read_bytes()

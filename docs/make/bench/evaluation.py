@@ -166,7 +166,10 @@ def time_calls(
     progress: Progress,
     lanes: dict[str, int] | None = None,
 ) -> Timed:
-    """Time calls in rounds; `lanes` of each call, by default those of the plan."""
+    """Time calls in rounds.
+
+    lanes : number of lanes of each call; by default the number of lanes of the plan.
+    """
     lanes = lanes or dict.fromkeys(calls, plan.lanes)
     timed = {name: partial(kernel_time, call) for name, call in calls.items()}
     measured = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, what))

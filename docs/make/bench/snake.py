@@ -68,7 +68,7 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
 def _load(
     skin: str, scenes: Path, table: Path, variant: str, width: int, height: int, spp: int
 ) -> dict[str, float]:
-    """Load the scene of this process, and return what is known of it."""
+    """Load the scene of this process, and return the facts about it."""
     set_variant(variant)
     scene = snake_scene(scenes, table, resx=str(width), resy=str(height))
     if skin == _ROUGH:

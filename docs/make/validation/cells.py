@@ -43,7 +43,7 @@ def compared(material: str, kinds: Sequence[str] = KINDS) -> list[PatchCompariso
 def chosen(
     comparisons: Sequence[PatchComparison], kinds: Sequence[str], slope: float, material: str
 ) -> list[PatchComparison]:
-    """Return those of surfaces of some kinds, a slope and a material."""
+    """Return the cases of surfaces of some kinds, a slope and a material."""
     return [
         c
         for c in comparisons

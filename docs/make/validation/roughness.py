@@ -132,7 +132,7 @@ def estimate(
     wavelength: ArrayLike,
     **settings: Any,
 ) -> Estimate:
-    """`reference.brdf` of some fields, averaged; `settings` are arguments of it."""
+    """Average `reference.brdf` over fields; settings : its further arguments."""
     samples = [reference.brdf(field, wi, wo, wavelength, **settings) for field in fields]
     return Estimate.of(np.array(samples))
 

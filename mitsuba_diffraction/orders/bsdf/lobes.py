@@ -3,7 +3,7 @@
 With q = k (u, v) of ωi + ωo, f cosθo = Σ_m η_m(ωi, λ) (k²σ²/π) exp(−σ²|q − q_m|²) cosθo: each
 lobe's integral over directions is its order's efficiency, but for what lies beyond the horizon.
 Order 0 is a mirror's lobe (`optics.mirror`): times C(X_i) C(X_o), it has all of its efficiency.
-Look-ups are those of `lookup`, with the grid on the device.
+Orders are looked up by the functions of `lookup`, with the grid on the device.
 """
 
 from __future__ import annotations
