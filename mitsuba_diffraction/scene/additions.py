@@ -18,7 +18,7 @@ from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .mesh_materials import OWN, PART, own_bsdf
 from .orbit import ORBIT
-from .orientation.mesh_files import load_materials, write_ply
+from .orientation.mesh_files import read_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
 from .surfaces import MATERIAL, REFLECTING, copied, targets_of
 
@@ -82,7 +82,8 @@ def fit_meshes(state: Any, folder: Path) -> None:
         file = Path(str(mi.file_resolver().resolve(props["filename"])))
         fit, up, written = _boolean(props, "fit"), props.get("up", "auto"), folder / f"{number}.ply"
         if (file, fit, up) not in fitted:
-            fitted[file, fit, up] = fitted_mesh(file, fit=fit, up=up), load_materials(file)
+            read = read_mesh(file)
+            fitted[file, fit, up] = fitted_mesh(read, fit=fit, up=up), read.materials
         mesh, materials = fitted[file, fit, up]
         _frame(state, mesh.positions, props)
         part = [int(each) for each in props.get(PART, "").split(",") if each]

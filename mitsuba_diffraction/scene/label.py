@@ -19,7 +19,7 @@ from ..plugin.presets import PATCHES
 from .fitted_mesh import fitted_mesh
 from .hologram import Files
 from .logo import HUES, Areas, logo, wavelengths_of
-from .orientation.mesh_files import load_mesh
+from .orientation.mesh_files import read_mesh
 from .stage import STUDIO
 
 #: Length of the tangential part of ω_i + ω_o: periods of 1.0 to 1.4 µm are blue to red.
@@ -96,14 +96,14 @@ def front(
     Raises a DiffractionError if the mesh has no texture coordinates, no area of them there, or a
     seam of them within the label, or if its normals point inwards there.
     """
-    own = load_mesh(file)  # coordinates before those without area are replaced
-    if own.uv is None:
+    read = read_mesh(file)
+    if read.mesh.uv is None:
         raise DiffractionError(
             f"mesh '{file}' has no texture coordinates, which a label needs; unwrap it, e.g. in "
             "Blender"
         )
-    mesh = fitted_mesh(file, up=up)
-    uv = own.uv[own.faces]
+    mesh = fitted_mesh(read, up=up)
+    uv = read.mesh.uv[read.mesh.faces]  # before coordinates without area are replaced
 
     def place_at(turn: float) -> LabelPlace:
         sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.scene.orientation.directions import direction_field
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
 from tests.support import ROOT
@@ -184,6 +184,19 @@ def test_a_written_mesh_reads_back(tmp_path: Path) -> None:
     read = load_mesh(tmp_path / "sheet.ply")
     for before, after in zip((positions, normals, uv, faces), read, strict=True):
         np.testing.assert_array_equal(before, after)
+
+
+def test_vertices_of_no_triangle_are_left_out(tmp_path: Path) -> None:
+    """One far away would shrink the mesh on the stage."""
+    positions, normals, uv, faces = _sheet(2)
+    turns = np.tile([0.0, 1.0], (len(positions), 1))
+    arrays = (np.insert(a, 3, 1000.0, axis=0) for a in (positions, normals, uv))
+    mesh = TriangleMesh(*arrays, faces + (faces >= 3), np.insert(turns, 3, 0.5, axis=0))
+    write_ply(tmp_path / "sheet.ply", mesh)
+    read = read_mesh(tmp_path / "sheet.ply")
+    for before, after in zip((positions, normals, uv, faces), read.mesh, strict=True):
+        np.testing.assert_array_equal(before, after)
+    np.testing.assert_array_equal(read.orientation, turns)
 
 
 def test_arrays_that_do_not_fit_are_refused() -> None:
