@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
@@ -15,6 +16,7 @@ from PIL import Image
 from ..arrays import Real
 from ..atomic import atomic_path
 from ..errors import DiffractionError
+from ..gltf import named_files
 from ..plugin.presets import PATCHES
 from .fitted_mesh import fitted_mesh
 from .hologram import Files
@@ -238,7 +240,7 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
     ----------
     parts : areas of the picture.
     place : where the label lies.
-    mesh : copied into the folder; None for a card.
+    mesh : copied into the folder with the files that it names; None for a card.
     values : defaults of the scene's parameters.
 
     Raises a DiffractionError if the folder cannot be written to.
@@ -259,10 +261,11 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
         Image.fromarray(around).save(temporary, optimize=True)
     copies = {GRATING: PATCHES / "hologram.toml", RING: STUDIO.parent / RING}
     if mesh is not None:
-        copies[mesh.name] = mesh
+        copies |= {os.path.relpath(f, mesh.parent): f for f in (mesh, *named_files(mesh))}
     for name, source in copies.items():
         if (folder / name).exists() and source.samefile(folder / name):
             continue  # the mesh lies in the folder
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(folder / name) as temporary:
             shutil.copyfile(source, temporary)
     ny, nx = foil.weight.shape
