@@ -260,8 +260,9 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
     with atomic_path(folder / AROUND) as temporary:
         Image.fromarray(around).save(temporary, optimize=True)
     copies = {GRATING: PATCHES / "hologram.toml", RING: STUDIO.parent / RING}
+    copy = "" if mesh is None else mesh.name.replace("$", "_")  # $ begins a scene's parameter
     if mesh is not None:
-        copies |= {os.path.relpath(f, mesh.parent): f for f in (mesh, *named_files(mesh))}
+        copies |= {os.path.relpath(f, mesh.parent): f for f in named_files(mesh)} | {copy: mesh}
     for name, source in copies.items():
         if (folder / name).exists() and source.samefile(folder / name):
             continue  # the mesh lies in the folder
@@ -288,14 +289,12 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
         "ring_low": f"{_MIDDLE + low:.6g}", "ring_high": f"{_MIDDLE + high:.6g}",
     }  # fmt: skip
     scene = folder / SCENE
-    _write_scene(scene, given | values, lamp, mesh)
+    _write_scene(scene, given | values, lamp, copy)
     return scene
 
 
-def _write_scene(
-    file: Path, values: Mapping[str, str], lamp: Mapping[str, str], mesh: Path | None
-) -> None:
-    """Write the scene with these defaults, and a mesh in the card's place."""
+def _write_scene(file: Path, values: Mapping[str, str], lamp: Mapping[str, str], mesh: str) -> None:
+    """Write the scene with these defaults, and a mesh of this name in the card's place, if any."""
     builder = ElementTree.TreeBuilder(insert_comments=True)
     parser = ElementTree.XMLParser(target=builder)
     root = ElementTree.parse(STUDIO.parent / "label.xml", parser).getroot()
@@ -303,13 +302,13 @@ def _write_scene(
         default.set("value", values.get(default.get("name", ""), default.get("value", "")))
     for number, (name, value) in enumerate(lamp.items()):
         root.insert(number, ElementTree.Element("default", name=name, value=value))
-    if mesh is not None:
+    if mesh:
         shape = next(each for each in root.iter("shape") if each.get("id") == "label")
         shape.set("type", "fitted_mesh")
         placed = shape.find("transform")
         assert placed is not None
         placed[:] = [ElementTree.Element("rotate", z="1", angle="$turn")]
-        texts = {"filename": mesh.name, "up": "$up", "frame": "$frame"}
+        texts = {"filename": mesh, "up": "$up", "frame": "$frame"}
         shape[:0] = [ElementTree.Element("string", name=k, value=v) for k, v in texts.items()]
     ElementTree.indent(root, "    ")
     text = '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, "unicode")
