@@ -20,7 +20,7 @@ from .mesh_materials import OWN, PART, own_bsdf
 from .orbit import ORBIT
 from .orientation.mesh_files import read_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
-from .surfaces import MATERIAL, REFLECTING, copied, targets_of
+from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
 
 #: Shape that is put on the stage.
 FITTED = "fitted_mesh"
@@ -112,8 +112,7 @@ def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
     placed = positions @ matrix[:3, :3].T + matrix[:3, 3]
     props = sensor.props
     pose = np.array(props["to_world"].matrix)
-    film = next(state.nodes[n].props for n in targets_of(sensor).values()
-                if state.nodes[n].type == mi.ObjectType.Film)  # fmt: skip
+    film = state.nodes[next(iter(inner(state, sensor, mi.ObjectType.Film).values()))].props
     size = np.array([film.get("width", 768), film.get("height", 576)], float)
     tangents = size / size.min() * np.tan(np.radians(float(props["fov"]) / 2))
     seen = turned_around(placed) if frame == "turning" else placed
@@ -163,7 +162,6 @@ def put_box_filters(state: Any) -> None:
     for node in state.nodes:
         if node.type != mi.ObjectType.Film:
             continue
-        for name, target in targets_of(node).items():
-            if state.nodes[target].type == mi.ObjectType.ReconstructionFilter:
-                del node.props[name]
+        for name in inner(state, node, mi.ObjectType.ReconstructionFilter):
+            del node.props[name]
         node.props["box"] = mi.load_dict({"type": "box"})

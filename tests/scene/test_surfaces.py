@@ -127,6 +127,19 @@ def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):
         bsdfs(surface, {"spare": SETTINGS})
 
 
+@pytest.mark.parametrize("part", ['<bsdf type="plastic"', '<ref id="below"'])
+def test_what_lies_beneath_a_replaced_surface_is_kept(surface, part):
+    (surface / "scene.xml").write_text(f"""<scene version="3.0.0"><bsdf type="plastic" id="below"/>
+    <bsdf type="diffraction" id="skin">
+        <string name="filename" value="{surface / "grating.npy"}"/>
+        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
+        <boolean name="energy_conserving" value="false"/>{part} name="beneath"/>
+    </bsdf><shape type="sphere" id="ball"><ref id="skin"/></shape></scene>""")
+    text = bsdfs(surface, {"skin": SETTINGS})["ball"]
+    assert "Plastic" in text
+    assert text.count("Diffraction[") == 2  # on both sides
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_surface_that_another_one_hides_is_refused(surface, order):
     both = {"mat-Skin": SETTINGS, "elm__0": SETTINGS}
