@@ -118,7 +118,10 @@ def _load(file: Path) -> mi.Mesh:
     try:
         return _read(file, kind)
     except _UNREAD as error:
-        triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
+        triangles = None
+        # numbers and names of a damaged header or body
+        with contextlib.suppress(struct.error, ValueError, LookupError, OverflowError, MemoryError):
+            triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
         if kind == "obj" and "invalid vertex normal" in str(error):
             warn(f"mesh '{file}': a vertex normal has length 0; all are rebuilt from the triangles")
             triangles = _CORNER.sub(rb"\1\2", _NORMAL.sub(b"", file.read_bytes()))
@@ -175,14 +178,6 @@ def triangulated_ply(data: bytes) -> bytes | None:
 
     Faces must come after vertices; the result has nothing else. None for other files.
     """
-    try:
-        return _triangulated(data)
-    # numbers and names of a damaged header or body
-    except (struct.error, ValueError, LookupError, OverflowError, MemoryError):
-        return None
-
-
-def _triangulated(data: bytes) -> bytes | None:
     header = parsed_header(data, "")
     if header is None or [e.name for e in header.elements[:2]] != ["vertex", "face"]:
         return None
