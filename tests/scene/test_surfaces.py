@@ -178,6 +178,7 @@ def test_each_edit_is_said_with_its_shapes_and_index(surface):
 
 
 def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
+    metal = f"{surface / 'grating.npy'}{SETTINGS},material=Al"
     xml = f"""<scene version="3.0.0"><default name="up" value="0"/><default name="r" value="1"/>
     <bsdf type="diffraction" id="skin">
         <string name="filename" value="{surface / "grating.npy"}"/>
@@ -186,11 +187,11 @@ def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
     </bsdf><shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>
     <shape type="disk"><ref id="skin"/></shape></scene>"""
     (surface / "scene.xml").write_text(xml.replace('<default name="up" value="0"/>', ""))
-    load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "r": "2"})  # of the sphere
+    load_scene(surface / "scene.xml", {"material:skin": metal, "r": "2"})  # of the sphere
     (surface / "scene.xml").write_text(xml.replace('scale" value="$r"', 'scale" value="$up"'))
-    load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "0.0"})  # the default
+    load_scene(surface / "scene.xml", {"material:skin": metal, "up": "0.0"})  # the default
     with pytest.raises(DiffractionError, match=r"up=2 changes nothing"):
-        load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "2"})
+        load_scene(surface / "scene.xml", {"material:skin": metal, "up": "2"})
 
 
 def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surface):
@@ -204,8 +205,9 @@ def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surfa
         <bsdf type="diffuse" id="skin"/><shape type="sphere"><ref id="skin"/></shape>
         <include filename="$light"/></scene>"""
     )
-    values = {"material:skin": "preset:dvd", "light": str(surface / "lit.xml"), "power": "2"}
+    metal = f"{surface / 'grating.npy'}{SETTINGS},material=Al"
+    values = {"material:skin": metal, "light": str(surface / "lit.xml"), "power": "2"}
     assert len(load_scene(surface / "scene.xml", values).emitters()) == 1
     # the default in other words
-    values = {"material:skin": "preset:dvd", "light": str(surface / "dark.xml")}
+    values = {"material:skin": metal, "light": str(surface / "dark.xml")}
     assert not load_scene(surface / "scene.xml", values).emitters()
