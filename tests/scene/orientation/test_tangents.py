@@ -104,21 +104,6 @@ def test_normals_without_length_are_rebuilt_with_a_note(tmp_path, some_variant, 
     assert (mesh.uv is not None) == ("/{0}/" in corner)
 
 
-def test_turning_tangents_are_named() -> None:
-    positions, normals, uv, faces = _sheet(16)
-    # the texture turns by a right angle half-way
-    right = positions[faces].mean(axis=1)[:, 0] > 0.5
-    split = faces.copy()
-    split[right] += len(positions)
-    turned = np.stack([uv[:, 1], -uv[:, 0]], axis=1)
-    report = check_tangents(
-        np.tile(positions, (2, 1)), np.tile(normals, (2, 1)), np.concatenate([uv, turned]), split
-    )
-    # one triangle in each cell on both sides of the seam
-    assert report.turning == pytest.approx(2 * 0.5 / 16)
-    assert not report.usable
-
-
 def test_stretch_is_the_ratio_of_the_tangents() -> None:
     positions, normals, uv, faces = _sheet()
     uv[:, 0] /= 3
@@ -312,18 +297,16 @@ def test_singular_points_are_no_lines(cells, along):
 
 @pytest.mark.parametrize("cells", [8, 64])
 def test_a_seam_of_the_texture_is_as_long_however_fine_the_mesh(cells):
-    grid = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(0, 1, cells + 1)], indexing="ij"))
-    x, y = grid
-    positions = np.stack([x, y, 0 * x], axis=1)
-    normals = np.tile([0.0, 0.0, 1.0], (len(x), 1))
-    faces = grid_faces(np.arange(len(x)).reshape(cells + 1, cells + 1))
+    positions, normals, uv, faces = _sheet(cells)
     right = positions[faces].mean(axis=1)[:, 0] > 0.5
-    faces[right] += len(x)  # where u runs along y
-    uv = np.concatenate([np.stack([x, y], axis=1), np.stack([y, -x], axis=1)])
+    faces[right] += len(positions)  # where u runs along y
+    uv = np.concatenate([uv, np.stack([uv[:, 1], -uv[:, 0]], axis=1)])
     two = np.tile(positions, (2, 1)), np.tile(normals, (2, 1))
     report = check_tangents(*two, uv, faces)
     assert report.broken == pytest.approx(1.0)
+    # one triangle in each cell on both sides of the seam
+    assert report.turning == pytest.approx(2 * 0.5 / cells)
     assert not report.usable
     # turned back by the orientation, nothing is left of it
-    back = np.repeat([[1.0, 0.0], [0.0, -1.0]], len(x), axis=0)
+    back = np.repeat([[1.0, 0.0], [0.0, -1.0]], len(positions), axis=0)
     assert check_tangents(*two, uv, faces, back).usable
