@@ -17,9 +17,8 @@ from PIL import Image
 
 from .errors import DiffractionError, one_line
 from .extras import optional
-from .files import path_beside, read_bytes, refuse_pipe
+from .files import GLTF, path_beside, read_bytes, refuse_pipe
 from .images import without_programs
-from .inputs import note_input
 from .limits import MOST_PLACED, bounded_memory, check_content, check_count, tree_sizes
 
 # Bytes of a number by the code of its type, and numbers of an item (glTF 2.0, 3.6.2)
@@ -93,13 +92,21 @@ class _Folder:
         return iter(())
 
 
-def note_named(file: Path) -> None:
-    """Note as inputs the buffers and pictures that lie beside a glTF file."""
-    with contextlib.suppress(DiffractionError, ValueError, LookupError, AttributeError):
+def named_files(file: Path) -> list[Path]:
+    """List the buffers and pictures of a glTF file that lie in its folder; none of other files.
+
+    Readers refuse buffers and pictures that lie elsewhere, and damaged files.
+    """
+    found: list[Path] = []
+    if file.suffix.lower() not in GLTF:
+        return found
+    with contextlib.suppress(ValueError, LookupError, TypeError, AttributeError):
         document, _ = _parts(file)
         for item in (*document.get("buffers", ()), *document.get("images", ())):
             if not (name := str(item.get("uri", "data:"))).startswith("data:"):
-                note_input(file.parent / unquote(name))
+                with contextlib.suppress(DiffractionError):
+                    found.append(path_beside(file, unquote(name)))
+    return found
 
 
 def materials_of(file: Path) -> list[GltfMaterial]:

@@ -20,7 +20,7 @@ from ..arrays import Real
 from ..errors import DiffractionError
 from ..progress import Progress, silent
 from .spectra import spectrum
-from .spectral_variables import RANGE, colours_of
+from .spectral_variables import RANGE, colours_of, whole_nanometres
 
 #: Angles of lamps and detectors, degrees. Each detector is 5° or more from the mirror direction,
 #: whose light any smooth surface reflects.
@@ -43,12 +43,14 @@ def angular_variables(
 
     Parameters are those of `spectra.spectrum`.
 
-    Raises a DiffractionError if the wavelengths have no two within 300 to 700 nm.
+    Raises a DiffractionError if the wavelengths have no two, a nanometre apart, within 300 to 700
+    nm.
     """
     inside = [w for w in np.ravel(wavelengths) if RANGE[0] <= w <= RANGE[1]]
-    if len(inside) < 2:
+    if len(inside) < 2 or whole_nanometres(np.array(inside)).size < 2:
         raise DiffractionError(
-            "iridescence is measured from 300 to 700 nm; give two wavelengths of these at least"
+            "iridescence is measured from 300 to 700 nm; give two wavelengths of these at least, a "
+            "nanometre apart"
         )
     collected = np.tile(-DETECTORS, len(LAMPS))  # + on the lamp's side, as the lamp's own angle
     rows: list[dict[str, Any]] = []

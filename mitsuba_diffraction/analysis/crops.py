@@ -22,16 +22,16 @@ def crops_of(
 ) -> list[HeightField]:
     """Return crops of equal size, side by side, each treated as a scan of its own.
 
-    Raises a DiffractionError if the file is a recipe, or the crops have fewer than `FEWEST_PIXELS`
-    a side.
+    Raises a DiffractionError if the file is a recipe, or `count` crops have fewer than
+    `FEWEST_PIXELS` a side.
 
     Parameters
     ----------
     path : heights of any format.
     options : how they are read and treated.
     count : crops, at least 1.
-    side : of square crops, µm, of which as many as fit are returned, spread over the scan; whole
-        scans that are narrower. Without, `count` crops share the scan.
+    side : of square crops, µm, of which at most `count` are returned, spread over the scan; none
+        if none fits, or they are of single pixels. Without, `count` crops share the scan.
     """
     raw = options.updated(LoadOptions.parse(level="none"))
     source = Source.of(path, raw)
@@ -44,11 +44,11 @@ def crops_of(
 
 
 def _squares(whole: HeightField, count: int, side: float) -> list[HeightField]:
-    """Cut at most `count` squares, spread over the field, or return the field if it is narrower."""
+    """Cut at most `count` squares of more than a pixel, spread over the field."""
     nx, ny = (round(side / pixel) for pixel in whole.pixel_size)
+    if not (1 < nx <= whole.shape[1] and 1 < ny <= whole.shape[0]):
+        return []
     columns, rows = whole.shape[1] // nx, whole.shape[0] // ny
-    if not columns * rows:
-        return [whole]
     cells = np.unique(np.linspace(0, columns * rows - 1, count).round().astype(int))
     # the squares lie evenly between the edges
     left = np.linspace(0, whole.shape[1] - nx, columns).round().astype(int)

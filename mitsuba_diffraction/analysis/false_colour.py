@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+# Height of a picture at most, inches: of narrower ones than 1 : 10 the figure needs gigabytes.
+_TALLEST = 60.0
 # Share of the pixels that are brighter than white.
 _WHITE = 0.02
 # Colours of curves that are shown as red, green and blue, and of one that is not shown.
@@ -52,7 +54,7 @@ def false_colour_figure(channels: Real, eye: Eye, exposure: float = 0.0, title: 
     light = adapted(channels)
     white = 2.0**-exposure * max(float(np.quantile(light.max(axis=2), 1.0 - _WHITE)), 1e-30)
     pictures = shown_receptors(channels.shape[2])
-    height = 6.0 * channels.shape[0] / channels.shape[1]
+    height = min(6.0 * channels.shape[0] / channels.shape[1], _TALLEST)
     figure = Figure(figsize=(6.0 * len(pictures), height + 1.8), dpi=120, layout="constrained")
     rows = figure.subplots(2, len(pictures), squeeze=False, height_ratios=(height, 1.5))
     curves = responses(eye) / responses(eye).max(axis=1, keepdims=True)

@@ -218,7 +218,7 @@ def light_and_chance(
         np.random.default_rng(seed).exponential(1.0 / math.log(2.0), shape)
         for seed in range(CHANCES)
     ]
-    own, *unordered = _by_direction(table, light, factor, speckles)
+    own, *unordered = diffracted_light(table, light, factor, speckles)
     chance = float(np.mean([each.iridescence() for each in unordered]))
     total = float(own.xyz[..., 1].sum())
     share = float(np.mean([each.xyz[..., 1].sum() for each in unordered])) / max(total, 1e-300)
@@ -226,8 +226,11 @@ def light_and_chance(
 
 
 def diffracted_light(
-    table: DiffractionTable, light: LightDirection, factor: Factor | None = None
-) -> DiffractedLight:
+    table: DiffractionTable,
+    light: LightDirection,
+    factor: Factor | None = None,
+    speckles: Sequence[Real] = (),
+) -> list[DiffractedLight]:
     """Collect the orders of a table by direction, in daylight (D65).
 
     An order of power P leaves in the direction sinθo = λq/2π − sinθi. It is seen through a
@@ -235,23 +238,16 @@ def diffracted_light(
     the window and longer, order 0 among them, are the mirror's lobe and left out. Powers follow
     Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
 
-    table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
-    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
+    Returns the table's light, and the light of each unordered surface of `speckles`.
 
     Raises a DiffractionError if the table lacks orders, or wavelengths from 380 nm on.
-    """
-    return _by_direction(table, light, factor)[0]
 
-
-def _by_direction(
-    table: DiffractionTable,
-    light: LightDirection,
-    factor: Factor | None,
-    speckles: Sequence[Real] = (),
-) -> list[DiffractedLight]:
-    """Collect the orders, and once more for each field of factors that replaces their powers.
-
-    speckles : factors (2 ny + 1, 2 nx + 1) on the median power of all orders at a frequency.
+    Parameters
+    ----------
+    table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
+    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
+    speckles : factors (2 ny + 1, 2 nx + 1) on the median power of all orders at a frequency, in
+        place of the powers.
     """
     if table.wavelength_range[0] > SHORTEST:
         raise DiffractionError(

@@ -60,7 +60,8 @@ def patches_figure(fields: Sequence[HeightField]) -> Figure:
 def _heights(axes: Axes, field: HeightField, width: float) -> None:
     """Draw the corner of a patch up to `width` µm in both directions."""
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
-    part = field.heights[: min(ny, round(width / dy)), : min(nx, round(width / dx))] * 1000
+    rows, columns = (max(1, min(n, round(width / d))) for n, d in ((ny, dy), (nx, dx)))
+    part = field.heights[:rows, :columns] * 1000
     low, high = np.percentile(part, [0.05, 99.95])
     extent = (0, part.shape[1] * dx, 0, part.shape[0] * dy)
     image = axes.imshow(
@@ -123,8 +124,8 @@ def colour_field(field: HeightField, size: int = 301) -> Real:
 def _mirror_share(field: HeightField, wavelength: float) -> float:
     """Return the share of the light within 3 orders of the mirror direction."""
     powers = order_powers(field, wavelength)
-    y, x = (n // 2 for n in powers.shape)
-    return float(powers[y - 3 : y + 4, x - 3 : x + 4].sum())
+    y, x = (slice(max(0, n // 2 - 3), n // 2 + 4) for n in powers.shape)
+    return float(powers[y, x].sum())
 
 
 def _drawn(

@@ -14,7 +14,6 @@ of angle θ to, and at −θ on the lamp's side.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -36,7 +35,14 @@ from ..progress import Progress, silent
 from .known_wavelengths import check_material, known_range
 from .maps.evaluate import opaque
 from .maps.hemisphere import flat_interaction
-from .spectrometer import MeasurementGeometry, across_plane, cone, light_direction, lobe_width
+from .spectrometer import (
+    MeasurementGeometry,
+    across_plane,
+    column_name,
+    cone,
+    light_direction,
+    lobe_width,
+)
 
 #: What spectra are relative to: a white standard, a perfect mirror at its own angle, or the light
 #: that falls on the surface.
@@ -81,8 +87,7 @@ class Spectra:
 
     def names(self, group: str = "") -> list[str]:
         """Return names of the detectors' columns, with a group's name before them."""
-        words = re.sub(r"[^\w.]", "_", group)
-        return [f"{words}_{name}" if words else name for name in self.geometry.names]
+        return [f"{column_name(group)}_{name}" if group else name for name in self.geometry.names]
 
     def columns(self, group: str = "") -> dict[str, Real]:
         """Return the spectra by name: each detector's, and its s and p if there are any."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Fewest detectors from which on a map of angle and wavelength is drawn beside the curves.
+#: Fewest detectors from which on a map of angle and wavelength is drawn beside curves.
 MAPPED = 8
 
 #: Azimuth of a lamp that is turned for each scan.
@@ -150,7 +150,7 @@ def spectra_figure(groups: Groups | Spectra, title: str = "", azimuth: str = "")
         groups = {"": groups}
     first = next(iter(groups.values()))
     geometry = first.geometry
-    mapped = len(geometry.detectors) >= MAPPED
+    mapped = len(geometry.detectors) >= MAPPED and first.wavelength.size > 1
     figure = Figure(figsize=(12.5 if mapped else 7.5, 4.2), dpi=120, layout="constrained")
     axes = figure.subplots(1, 1 + mapped, squeeze=False)[0]
     for number, (name, spectra) in enumerate(groups.items()):
@@ -186,7 +186,9 @@ def _draw(axes: Axes, name: str, spectra: Spectra, colour: Any, first: Spectra) 
         values, style = 100.0 * spectra.value[:, n], _STYLES[n % len(_STYLES)]
         drawn = colours[n] if colour is None else colour
         label = f"{name}, {angle:g}°" if name else f"detector at {angle:g}°"
-        axes.plot(lam, values, style, color=drawn, label=label)
+        # a line has no length at a single wavelength
+        marker = "o" if lam.size == 1 else ""
+        axes.plot(lam, values, style, marker=marker, color=drawn, label=label)
         if spectra.error is not None:
             error = 100.0 * spectra.error[:, n]
             axes.fill_between(lam, values - error, values + error, color=drawn, alpha=0.2, lw=0)

@@ -54,9 +54,14 @@ def daylit(spectra: Spectra) -> Real:
     return np.maximum(linear_srgb(spectra.value.T @ (response(lam) * step[:, None])), 0.0)
 
 
+def whole_nanometres(lam: Real) -> Real:
+    """Return whole nanometres within wavelengths (n,), at which pavo has the variables."""
+    return np.arange(np.ceil(max(lam[0], RANGE[0])), min(lam[-1], RANGE[1]) + 0.5)
+
+
 def _pavo(lam: Real, curve: Real) -> dict[str, Any]:
     """Return pavo's variables of a spectrum (n,) in per cent."""
-    grid = np.arange(np.ceil(max(lam[0], RANGE[0])), min(lam[-1], RANGE[1]) + 0.5)
+    grid = whole_nanometres(lam)
     if grid.size < 2:
         return {}
     fine = np.interp(grid, lam, curve)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,6 +73,11 @@ class MeasurementGeometry:
         return tuple(
             f"light{self.light:g}_detector{angle:g}".replace("-", "m") for angle in self.detectors
         )
+
+
+def column_name(group: str) -> str:
+    """Return the name of a group in names of columns, as R keeps them."""
+    return re.sub(r"[^\w.]", "_", group)
 
 
 def lobe_width(sigma: float | None, lam: Real) -> float:

@@ -249,7 +249,7 @@ def run_survey(
     surface : parameters of the BSDF, e.g. {"material": "keratin"}; a dielectric of 1.5 without.
     repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
     crops : measure so many crops of each scan, of `iridescence.WINDOW`, or as many as fit; scans
-        that are narrower, and recipes, are measured as a whole.
+        that are narrower, or have pixels as wide, and recipes are measured as a whole.
     client : `distributed.Client`, or None to measure in this process.
     progress : called as progress(scans done, scans in all, text).
 
@@ -335,14 +335,12 @@ def _files_of(file: Path) -> SceneFiles:
 
 
 def _crops_of(job: Job, file: Path, count: int) -> list[Job]:
-    """Return a job for each crop of a scan; the job itself for recipes and narrow scans."""
+    """Return a job for each crop of a scan; the job itself for recipes, and scans without crops."""
     options = job.treatment.options
     if Source.of(file, options).recipe is not None:
         return [job]
     found = crops_of(file, options, count, WINDOW)
-    if min(found[0].extent) < 0.99 * WINDOW:
-        return [job]
-    return [replace(job, crop=(n, count)) for n in range(len(found))]
+    return [replace(job, crop=(n, count)) for n in range(len(found))] or [job]
 
 
 def _stored_row(scans: Path, job: Job) -> dict[str, Any] | None:

@@ -192,14 +192,14 @@ def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
     from ..scene.fitted_mesh import fit_of
-    from ..scene.orientation.mesh_files import has_own_normals, load_mesh, load_orientation
+    from ..scene.orientation.mesh_files import read_mesh
     from ..scene.orientation.tangents import check_tangents
 
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
     with mitsuba_warnings():
-        mesh = load_mesh(file)
-        report = check_tangents(*mesh, load_orientation(file))
+        read = read_mesh(file)
+        mesh, report = read.mesh, check_tangents(*read.mesh, read.orientation)
     summary = report.summary()
     try:
         fit: Any = fit_of(mesh.positions, file).summary()
@@ -211,7 +211,7 @@ def _mesh(file: Path) -> dict[str, Any]:
         "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
         **summary,
         **({"materials": _materials(file)} if file.suffix.lower() in GLTF else {}),
-        "normals": "in the file" if has_own_normals(file) else _SMOOTH,
+        "normals": "in the file" if read.own_normals else _SMOOTH,
         "fit of render MESH --patch FILE": fit,
     }
 

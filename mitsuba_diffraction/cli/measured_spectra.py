@@ -105,7 +105,7 @@ class Measurement:
         from ..heights.spectra import dominant_periods
 
         args, geometry, first = self.args, self.geometry, float(self.lam[0])
-        asked = {**self._treatment(file).settings, **options.table_options(args)}
+        asked = {**self._treatment(file).settings, **options.table_options(args, options.TABLE)}
         asked["wavelength_range"] = table_range(self.lam)
         self.bar(0, 0, f"tabulating {file.name}")
         settings = source.settings_for(asked)

@@ -301,13 +301,16 @@ def table(names: Sequence[str] = TABLE, **defaults: str) -> Iterator[Row]:
         yield " ".join([_option(name), *values]), f"{item.help}; default: {default}", kind
 
 
-def table_options(args: argparse.Namespace) -> dict[str, Any]:
+def table_options(
+    args: argparse.Namespace, names: Sequence[str] = (*TABLE, "wavelength_range")
+) -> dict[str, Any]:
     """Return the settings of a table that are on the command line, by name.
+
+    names : of the settings that the command has for the table.
 
     Raises a DiffractionError if a value is not allowed.
     """
-    values = given(args, (*TABLE, "wavelength_range"))
-    return {name: checked(name, value) for name, value in values.items()}
+    return {name: checked(name, value) for name, value in given(args, names).items()}
 
 
 def direction(theta: float = 0.0, phi: float | None = 0.0) -> tuple[Row, Row]:

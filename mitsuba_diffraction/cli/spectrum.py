@@ -231,6 +231,7 @@ def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:
     Raises a DiffractionError if a group matches no file, or is named twice.
     """
     from ..analysis.repeats import sample_of, scan_files
+    from ..analysis.spectrometer import column_name
 
     if bool(args.files) == bool(args.groups):
         args.parser.error("give files, or groups of them with --group NAME=PATTERN")
@@ -244,9 +245,15 @@ def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:
             )
         return {"": files}
     groups: dict[str, list[Path]] = {}
+    columns: dict[str, str] = {}
     for name, pattern in args.groups:
         if name in groups:
             args.parser.error(f"argument --group: {name!r} is given more than once")
+        if (other := columns.setdefault(column_name(name), name)) != name:
+            args.parser.error(
+                f"argument --group: columns of {name!r} would have the names of {other!r}'s; "
+                "rename one"
+            )
         try:
             groups[name] = scan_files([Path(pattern)])
         except DiffractionError as error:

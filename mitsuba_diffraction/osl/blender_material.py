@@ -243,12 +243,9 @@ def _find_oslquery() -> None:
 
 
 def _describe(outer: Any, socket: Any, entry: dict[str, Any]) -> None:
-    """Give an input of a group the default, range and tooltip of its parameter."""
+    """Give an input of a group the default and tooltip of its parameter."""
     outer.description = entry["help"]
     outer.hide_value = socket.hide_value
-    for key in ("min_value", "max_value"):
-        if entry.get(key) is not None:
-            setattr(outer, key, entry[key])
     if entry.get("kind") == "color":
         colour = mathutils.Color(entry["default"]).from_rec709_linear_to_scene_linear()
         outer.default_value = (*colour, 1.0)

@@ -280,14 +280,15 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
     if len(colour) > 3:
         weights = linear_srgb(response(lam))
         colour = colour @ weights / weights.sum(axis=0)
-    red, green, blue = (float(max(value, 0.0)) for value in colour)
+    # mono variants have one number
+    red, green, blue = (float(max(value, 0.0)) for value in np.resize(colour, 3))
     return red, green, blue
 
 
 def _reflectance(
     bsdf: Any, uv: tuple[float, float], wavelengths: NDArray[np.floating]
 ) -> NDArray[np.float64]:
-    """Return the diffuse reflectance of a BSDF at wavelengths (n,), or (3,) in RGB variants."""
+    """Return a BSDF's diffuse reflectance at wavelengths (n,), or (3,) in RGB and (1,) in mono."""
     import drjit as dr
     import mitsuba as mi
 

@@ -18,9 +18,9 @@ from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .mesh_materials import OWN, PART, own_bsdf
 from .orbit import ORBIT
-from .orientation.mesh_files import load_materials, write_ply
+from .orientation.mesh_files import read_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
-from .surfaces import MATERIAL, REFLECTING, copied, targets_of
+from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
 
 #: Shape that is put on the stage.
 FITTED = "fitted_mesh"
@@ -82,7 +82,8 @@ def fit_meshes(state: Any, folder: Path) -> None:
         file = Path(str(mi.file_resolver().resolve(props["filename"])))
         fit, up, written = _boolean(props, "fit"), props.get("up", "auto"), folder / f"{number}.ply"
         if (file, fit, up) not in fitted:
-            fitted[file, fit, up] = fitted_mesh(file, fit=fit, up=up), load_materials(file)
+            read = read_mesh(file)
+            fitted[file, fit, up] = fitted_mesh(read, fit=fit, up=up), read.materials
         mesh, materials = fitted[file, fit, up]
         _frame(state, mesh.positions, props)
         part = [int(each) for each in props.get(PART, "").split(",") if each]
@@ -111,8 +112,7 @@ def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
     placed = positions @ matrix[:3, :3].T + matrix[:3, 3]
     props = sensor.props
     pose = np.array(props["to_world"].matrix)
-    film = next(state.nodes[n].props for n in targets_of(sensor).values()
-                if state.nodes[n].type == mi.ObjectType.Film)  # fmt: skip
+    film = state.nodes[next(iter(inner(state, sensor, mi.ObjectType.Film).values()))].props
     size = np.array([film.get("width", 768), film.get("height", 576)], float)
     tangents = size / size.min() * np.tan(np.radians(float(props["fov"]) / 2))
     seen = turned_around(placed) if frame == "turning" else placed
@@ -162,7 +162,6 @@ def put_box_filters(state: Any) -> None:
     for node in state.nodes:
         if node.type != mi.ObjectType.Film:
             continue
-        for name, target in targets_of(node).items():
-            if state.nodes[target].type == mi.ObjectType.ReconstructionFilter:
-                del node.props[name]
+        for name in inner(state, node, mi.ObjectType.ReconstructionFilter):
+            del node.props[name]
         node.props["box"] = mi.load_dict({"type": "box"})

@@ -41,9 +41,17 @@ class SensorBands(NamedTuple):
 
     @property
     def first(self) -> float:
-        """Shortest wavelength that a channel responds to, nm; responses are linear between."""
-        seen = [any(values) for values in zip(*self.responses.values(), strict=True)]
-        return float(self.wavelengths[max(seen.index(True) - 1, 0)])
+        """Shortest wavelength that a channel responds to, nm; responses are linear between.
+
+        Raises a DiffractionError if no channel responds to any.
+        """
+        seen = np.flatnonzero(np.any(list(self.responses.values()), axis=0))
+        if not seen.size:
+            raise DiffractionError(
+                "the film responds to no wavelength: the light has none that the eye sees; give "
+                "another light or eye"
+            )
+        return float(self.wavelengths[max(seen[0] - 1, 0)])
 
 
 def put_bands(state: Any, bands: SensorBands) -> None:

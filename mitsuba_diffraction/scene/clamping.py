@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from .surfaces import appended
 
 #: Name of the integrator.
 CLAMPED = "clamped_samples"
@@ -23,12 +24,9 @@ def put_clamp(state: Any, limit: float) -> None:
     for number in range(len(state.nodes)):
         if state.nodes[number].type != mi.ObjectType.Integrator:
             continue
-        nested = mi.parser.SceneNode()
-        nested.type, nested.props = mi.ObjectType.Integrator, state.nodes[number].props
-        state.nodes.append(nested)  # which may move the nodes: earlier references end
         props = mi.Properties(CLAMPED)
         props["limit"] = limit
-        props["nested"] = mi.Properties.ResolvedReference(len(state.nodes) - 1)
+        props["nested"] = appended(state, mi.ObjectType.Integrator, state.nodes[number].props)
         state.nodes[number].props = props
 
 

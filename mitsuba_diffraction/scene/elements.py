@@ -15,7 +15,7 @@ from ..plugin.parameter_changes import children
 from ..plugin.textures import is_attribute
 from .meshes import has_texcoords
 
-#: What `meshes.write_ply` calls a field of directions.
+#: What `mesh_files.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
 
 #: What Mitsuba's parser gives to elements without an id, numbered.

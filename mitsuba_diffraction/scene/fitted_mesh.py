@@ -12,7 +12,7 @@ from ..arrays import Real
 from ..errors import DiffractionError, check_choice
 from .orientation.directions import direction_field
 from .orientation.interchange import stated_up
-from .orientation.mesh_files import load_mesh, load_orientation
+from .orientation.mesh_files import MeshFile
 from .orientation.tangents import check_tangents
 from .orientation.trimesh import TriangleMesh, oriented_mesh
 
@@ -97,18 +97,18 @@ def fit_of(positions: Real, file: Path, up: str = "auto") -> MeshPlacement:
     return MeshPlacement(up, rotation, scale, shift, scale * (high - low))
 
 
-def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMesh:
-    """Read a mesh, put it on the stage, and give its patch a direction.
+def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> TriangleMesh:
+    """Return a mesh put on the stage, whose patch has a direction.
 
     The direction is the file's `vertex_orientation`; else ∂p/∂u where texture coordinates suit a
     patch; else the smoothest field of directions.
 
-    Raises a DiffractionError if the file is not a mesh, or the mesh does not fit.
+    Raises a DiffractionError if the mesh does not fit.
     """
-    positions, normals, uv, faces = load_mesh(file)
-    placed = fit_of(positions, file, up)
-    orientation = load_orientation(file)
-    if orientation is None and check_tangents(positions, normals, uv, faces).usable:
+    positions, normals, uv, faces = read.mesh
+    placed = fit_of(positions, read.file, up)
+    orientation = read.orientation
+    if orientation is None and check_tangents(*read.mesh).usable:
         orientation = np.tile([1.0, 0.0], (len(positions), 1))
     if fit:
         positions = placed.scale * (positions @ placed.rotation.T) + placed.shift

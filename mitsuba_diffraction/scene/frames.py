@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import io
+import itertools
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -148,13 +149,17 @@ def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
     if film.suffix.lower() == ".mp4":
         _write_mp4(frames, film, fps)
         return
+    # a frame ends at a whole unit, ms, so that frames of several lengths keep the rate
+    unit = 10 if film.suffix.lower() == ".gif" else 1
+    ends = [unit * round(1000 * n / (fps * unit)) for n in range(len(frames) + 1)]
     # not as open files, of which there may be too many
     pictures = [open_image(io.BytesIO(path.read_bytes()), ("PNG",)) for path in frames]
     try:
         with atomic_path(film) as temporary:
             pictures[0].save(
                 temporary, format=film.suffix[1:].upper(), save_all=True,
-                append_images=pictures[1:], duration=round(1000 / fps), loop=0,
+                append_images=pictures[1:], loop=0,
+                duration=[end - start for start, end in itertools.pairwise(ends)],
                 **FILMS[film.suffix.lower()],
             )  # fmt: skip
     except (OSError, KeyError, ValueError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
@@ -15,11 +16,12 @@ from PIL import Image
 from ..arrays import Real
 from ..atomic import atomic_path
 from ..errors import DiffractionError
+from ..gltf import named_files
 from ..plugin.presets import PATCHES
 from .fitted_mesh import fitted_mesh
 from .hologram import Files
 from .logo import HUES, Areas, logo, wavelengths_of
-from .orientation.mesh_files import load_mesh
+from .orientation.mesh_files import read_mesh
 from .stage import STUDIO
 
 #: Length of the tangential part of ω_i + ω_o: periods of 1.0 to 1.4 µm are blue to red.
@@ -96,14 +98,14 @@ def front(
     Raises a DiffractionError if the mesh has no texture coordinates, no area of them there, or a
     seam of them within the label, or if its normals point inwards there.
     """
-    own = load_mesh(file)  # coordinates before those without area are replaced
-    if own.uv is None:
+    read = read_mesh(file)
+    if read.mesh.uv is None:
         raise DiffractionError(
             f"mesh '{file}' has no texture coordinates, which a label needs; unwrap it, e.g. in "
             "Blender"
         )
-    mesh = fitted_mesh(file, up=up)
-    uv = own.uv[own.faces]
+    mesh = fitted_mesh(read, up=up)
+    uv = read.mesh.uv[read.mesh.faces]  # before coordinates without area are replaced
 
     def place_at(turn: float) -> LabelPlace:
         sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
@@ -238,7 +240,7 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
     ----------
     parts : areas of the picture.
     place : where the label lies.
-    mesh : copied into the folder; None for a card.
+    mesh : copied into the folder with the files that it names; None for a card.
     values : defaults of the scene's parameters.
 
     Raises a DiffractionError if the folder cannot be written to.
@@ -258,11 +260,13 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
     with atomic_path(folder / AROUND) as temporary:
         Image.fromarray(around).save(temporary, optimize=True)
     copies = {GRATING: PATCHES / "hologram.toml", RING: STUDIO.parent / RING}
+    copy = "" if mesh is None else mesh.name.replace("$", "_")  # $ begins a scene's parameter
     if mesh is not None:
-        copies[mesh.name] = mesh
+        copies |= {os.path.relpath(f, mesh.parent): f for f in named_files(mesh)} | {copy: mesh}
     for name, source in copies.items():
         if (folder / name).exists() and source.samefile(folder / name):
             continue  # the mesh lies in the folder
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         with atomic_path(folder / name) as temporary:
             shutil.copyfile(source, temporary)
     ny, nx = foil.weight.shape
@@ -285,14 +289,12 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
         "ring_low": f"{_MIDDLE + low:.6g}", "ring_high": f"{_MIDDLE + high:.6g}",
     }  # fmt: skip
     scene = folder / SCENE
-    _write_scene(scene, given | values, lamp, mesh)
+    _write_scene(scene, given | values, lamp, copy)
     return scene
 
 
-def _write_scene(
-    file: Path, values: Mapping[str, str], lamp: Mapping[str, str], mesh: Path | None
-) -> None:
-    """Write the scene with these defaults, and a mesh in the card's place."""
+def _write_scene(file: Path, values: Mapping[str, str], lamp: Mapping[str, str], mesh: str) -> None:
+    """Write the scene with these defaults, and a mesh of this name in the card's place, if any."""
     builder = ElementTree.TreeBuilder(insert_comments=True)
     parser = ElementTree.XMLParser(target=builder)
     root = ElementTree.parse(STUDIO.parent / "label.xml", parser).getroot()
@@ -300,13 +302,13 @@ def _write_scene(
         default.set("value", values.get(default.get("name", ""), default.get("value", "")))
     for number, (name, value) in enumerate(lamp.items()):
         root.insert(number, ElementTree.Element("default", name=name, value=value))
-    if mesh is not None:
+    if mesh:
         shape = next(each for each in root.iter("shape") if each.get("id") == "label")
         shape.set("type", "fitted_mesh")
         placed = shape.find("transform")
         assert placed is not None
         placed[:] = [ElementTree.Element("rotate", z="1", angle="$turn")]
-        texts = {"filename": mesh.name, "up": "$up", "frame": "$frame"}
+        texts = {"filename": mesh, "up": "$up", "frame": "$frame"}
         shape[:0] = [ElementTree.Element("string", name=k, value=v) for k, v in texts.items()]
     ElementTree.indent(root, "    ")
     text = '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(root, "unicode")

@@ -12,7 +12,7 @@ from ..errors import check_choice, warn
 from ..files import GLTF, readable_file
 from ..gltf import GltfMaterial, materials_of
 from ..plugin.pigment import base_colour
-from .surfaces import copied, targets_of
+from .surfaces import appended, copied, inner
 
 #: Values of `others`: materials that no surface is put on have the shape's surface, or their own.
 OTHERS = ("surface", "own")
@@ -66,9 +66,8 @@ def _part(state: Any, number: int, name: str, part: list[GltfMaterial], own: boo
     own : whether it has the file's material in place of the surface of the whole.
     """
     whole = state.nodes[number]
-    targets = targets_of(whole, state.id_to_index)
-    surfaces = [n for n, to in targets.items() if state.nodes[to].type == mi.ObjectType.BSDF]
-    copy = copied(whole.props, whole.props.plugin_name(), leave=surfaces if own else ())
+    surfaces = inner(state, whole, mi.ObjectType.BSDF) if own else ()
+    copy = copied(whole.props, whole.props.plugin_name(), leave=[*surfaces])
     if own:
         copy[OWN] = True
     copy[PART] = ",".join(str(material.number) for material in part)
@@ -81,11 +80,9 @@ def _put_shapes(state: Any, number: int, made: list[Any]) -> None:
     ids = {name: n for name, n in state.id_to_index.items() if n != number}
     state.nodes[number].props, ids[made[0].id()] = made[0], number
     for props in made[1:]:
-        node, last = mi.parser.SceneNode(), len(state.nodes)
-        node.type, node.props = mi.ObjectType.Shape, props
-        state.nodes.append(node)
-        state.nodes[0].props[f"part_{last}"] = mi.Properties.ResolvedReference(last)
-        ids[props.id()] = last
+        added = appended(state, mi.ObjectType.Shape, props)
+        ids[props.id()] = added.index()
+        state.nodes[0].props[f"part_{added.index()}"] = added
     state.id_to_index = ids
 
 

@@ -54,12 +54,8 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
         uv = np.array(values, np.float64).reshape(-1, 2)
     values = _call(mesh, "vertex_positions_buffer", "positions")
     positions = _of_vertices(values, 3, mesh, "position_index")
-    return MeshArrays(positions, normals, uv, mesh_faces(mesh))
-
-
-def mesh_faces(mesh: Any) -> Whole:
-    """Read the faces of a `mi.Mesh`, (m, 3) indices of vertices."""
-    return np.array(_call(mesh, "faces_buffer", "faces"), np.int64).reshape(-1, 3)
+    faces = np.array(_call(mesh, "faces_buffer", "faces"), np.int64).reshape(-1, 3)
+    return MeshArrays(positions, normals, uv, faces)
 
 
 def has_texcoords(mesh: Any) -> bool:

@@ -15,6 +15,7 @@ from ..limits import MOST_NESTED, check_content, check_count, tree_sizes
 from ..streams import without_chatter
 from .orientation.mesh_files import KINDS
 from .orientation.mesh_indices import check_mesh
+from .surfaces import targets_of
 
 # Mitsuba's plugins that read a picture
 _PICTURES = ("bitmap", "envmap")
@@ -73,12 +74,7 @@ def _check_nesting(state: Any) -> None:
 
     Descriptions of BSDFs (`str`) are such trees: 20 blends of the one before are a million nodes.
     """
-    kinds = mi.Properties.Type
-    inner: list[list[int]] = []
-    for node in state.nodes:
-        names = [n for n in node.props.keys() if node.props.type(n) == kinds.ResolvedReference]  # noqa: SIM118
-        inner.append([int(node.props[name].index()) for name in names])
-    sizes = tree_sizes(inner)
+    sizes = tree_sizes([list(targets_of(node).values()) for node in state.nodes])
     for number, node in enumerate(state.nodes):
         if node.type == mi.ObjectType.BSDF:
             shown = f"BSDF {node.props.id() or node.props.plugin_name()!r}"

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of, refuse_pipe
-from ..gltf import note_named
+from ..gltf import named_files
 from ..heights.lengths import numbers_of
 from ..inputs import note_input
 from ..limits import DEEPEST_ELEMENT, DEEPEST_INCLUDE, MOST_INCLUDES, check_count
@@ -84,7 +84,7 @@ def parameters_of(
 def files_of(
     scene: Path, values: Mapping[str, str] | None = None, *, with_sources: bool = True
 ) -> list[Path]:
-    """List the scene, its includes, and every file that its plugins or the listed recipes read.
+    """List the scene, its includes, and every file that plugins, recipes or glTF files read.
 
     Raises a DiffractionError if a file is a pipe or a device, for which Mitsuba would wait; if an
     include lies outside of the scene's folder; or if a recipe is wrong.
@@ -110,6 +110,7 @@ def files_of(
         if file in files or not os.path.isfile(file):  # Path.is_file() raises for long names
             continue
         files[file] = None
+        waiting += named_files(file)
         if with_sources and kind_of(file) is FileKind.RECIPE:
             waiting += Recipe.load(file).sources
     return list(files)
@@ -124,8 +125,6 @@ def note_files(file: Path, values: Mapping[str, str] | None = None) -> None:
     with contextlib.suppress(DiffractionError):
         for named in files_of(file, values):
             note_input(named)
-            if named.suffix.lower() == ".gltf":
-                note_named(named)
 
 
 def check_includes(files: Iterable[Path], known: Iterable[Path]) -> None:

@@ -139,10 +139,9 @@ def _shapes_with(state: Any, number: int) -> tuple[str, ...]:
 
 def _within(state: Any, node: Any) -> Iterator[int]:
     """Yield the numbers of the BSDFs of a shape, those within them included."""
-    for target in targets_of(node, state.id_to_index).values():
-        if state.nodes[target].type == mi.ObjectType.BSDF:
-            yield target
-            yield from _within(state, state.nodes[target])
+    for target in inner(state, node, mi.ObjectType.BSDF).values():
+        yield target
+        yield from _within(state, state.nodes[target])
 
 
 def effective(state: Any) -> list[str]:
@@ -214,18 +213,20 @@ def _put(state: Any, number: int, text: str) -> None:
     props = state.nodes[number].props
     name = props.id()
     if state.nodes[number].type == mi.ObjectType.Shape:
-        targets = _bsdfs(state, number)
+        targets = inner(state, state.nodes[number], mi.ObjectType.BSDF)
         beneath = [*targets.values()][-1] if targets else None
         changed = copied(props, props.plugin_name(), leave=[*targets])
         replaced = _with_surface(state, beneath, text, nested=False)
-        changed["bsdf"] = mi.Properties.ResolvedReference(_append(state, replaced))
+        changed["bsdf"] = appended(state, mi.ObjectType.BSDF, replaced)
     else:
         nested = any(
-            other.type == mi.ObjectType.BSDF and number in _bsdfs(state, n).values()
-            for n, other in enumerate(state.nodes)
+            other.type == mi.ObjectType.BSDF
+            and number in inner(state, other, mi.ObjectType.BSDF).values()
+            for other in state.nodes
         )
-        before = _append(state, copied(props, props.plugin_name()))  # what may lie beneath
-        changed = _with_surface(state, before, text, nested)
+        # what may lie beneath
+        before = appended(state, mi.ObjectType.BSDF, copied(props, props.plugin_name()))
+        changed = _with_surface(state, before.index(), text, nested)
     changed.set_id(name)
     state.nodes[number].props = changed
 
@@ -238,27 +239,28 @@ def _with_surface(state: Any, number: int | None, text: str, nested: bool) -> An
     """
     if number is not None:
         props = state.nodes[number].props
-        name, inner = next(iter(_bsdfs(state, number).items()), ("", number))
+        bsdfs = inner(state, state.nodes[number], mi.ObjectType.BSDF)
+        name, wrapped = next(iter(bsdfs.items()), ("", number))
         two_sided = props.plugin_name() == "twosided"
         if props.plugin_name() in _WRAPPERS or (
-            two_sided and state.nodes[inner].props.plugin_name() in _WRAPPERS
+            two_sided and state.nodes[wrapped].props.plugin_name() in _WRAPPERS
         ):
             copy = copied(props, props.plugin_name(), leave=[name])
-            within = _with_surface(state, inner, text, nested or two_sided)
-            copy[name] = mi.Properties.ResolvedReference(_append(state, within))
+            within = _with_surface(state, wrapped, text, nested or two_sided)
+            copy[name] = appended(state, mi.ObjectType.BSDF, within)
             return copy
-        number = inner if two_sided else number
+        number = wrapped if two_sided else number
     surface = _surface(state, text, number)
     return surface if nested else _two_sided(state, surface)
 
 
-def _bsdfs(state: Any, number: int) -> dict[str, int]:
-    """Return the numbers of the BSDFs that a node names, by the names of its properties."""
-    return {
-        name: target
-        for name, target in targets_of(state.nodes[number], state.id_to_index).items()
-        if state.nodes[target].type == mi.ObjectType.BSDF
-    }
+def inner(state: Any, node: Any, kind: Any) -> dict[str, int]:
+    """Return the numbers of the nodes of a kind within a node, by the names of its properties.
+
+    kind : of `mi.ObjectType`.
+    """
+    found = targets_of(node, state.id_to_index)
+    return {name: n for name, n in found.items() if state.nodes[n].type == kind}
 
 
 def targets_of(node: Any, ids: Mapping[str, int] | None = None) -> dict[str, int]:
@@ -312,9 +314,8 @@ def _surface(state: Any, text: str, beneath: int | None) -> Any:
     if not opaque:  # what lay beneath that one: a metal under a skin would look like chrome
         if "pigment" in old:
             props["pigment"] = old["pigment"]
-        for target in targets_of(state.nodes[beneath]).values():
-            if state.nodes[target].type == mi.ObjectType.BSDF:
-                props["beneath"] = mi.Properties.ResolvedReference(target)
+        for target in inner(state, state.nodes[beneath], mi.ObjectType.BSDF).values():
+            props["beneath"] = mi.Properties.ResolvedReference(target)
     return props
 
 
@@ -334,16 +335,19 @@ def _two_sided(state: Any, surface: Any) -> Any:
     if name == TRANSMITTING or (name == ORDERS and load_orders(surface["filename"]).sides == 2):
         return surface
     props = mi.Properties("twosided")
-    props["bsdf"] = mi.Properties.ResolvedReference(_append(state, surface))
+    props["bsdf"] = appended(state, mi.ObjectType.BSDF, surface)
     return props
 
 
-def _append(state: Any, props: Any) -> int:
-    """Add a BSDF to the scene; return its number."""
+def appended(state: Any, kind: Any, props: Any) -> Any:
+    """Add a node of a kind to the scene, and return a reference to it.
+
+    All nodes may move in memory: references to nodes in Python end.
+    """
     node = mi.parser.SceneNode()
-    node.type, node.props = mi.ObjectType.BSDF, props
+    node.type, node.props = kind, props
     state.nodes.append(node)
-    return len(state.nodes) - 1
+    return mi.Properties.ResolvedReference(len(state.nodes) - 1)
 
 
 def copied(props: Any, plugin: str, leave: Sequence[str] = ()) -> Any:

@@ -36,3 +36,8 @@ def test_a_grey_scene_is_grey_in_every_picture(name):
     for picture in pictures:
         assert np.ptp(picture, axis=2).max() < 1e-9
         assert np.ptp(picture) > 0.3
+
+
+def test_a_picture_of_a_column_of_pixels_is_no_larger_than_others():
+    figure = false_colour_figure(np.ones((5000, 1, 2)), eye_of("dog"))
+    assert figure.get_figheight() < 100.0

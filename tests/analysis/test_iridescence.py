@@ -25,7 +25,8 @@ LIGHT = LightDirection(30.0, 0.0)
 
 def light_of(field, light=LIGHT, **settings):
     settings = {"tolerance": 0.01, "wavelength_range": (380.0, 780.0), **settings}
-    return diffracted_light(DiffractionTable.build(field, **settings), light)
+    (found,) = diffracted_light(DiffractionTable.build(field, **settings), light)
+    return found
 
 
 def test_a_flat_patch_diffracts_nothing():

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.angular_variables import DETECTORS, LAMPS, fitted
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.analysis.angular_variables import (
+    DETECTORS,
+    LAMPS,
+    angular_variables,
+    fitted,
+)
 from mitsuba_diffraction.analysis.spectra import Spectra
+from mitsuba_diffraction.analysis.spectra_files import spectra_figure
 from mitsuba_diffraction.analysis.spectral_variables import colours_of
 from mitsuba_diffraction.analysis.spectrometer import MeasurementGeometry
 
@@ -37,6 +46,13 @@ def test_darkness_has_no_variables():
     assert fitted(INCIDENT, COLLECTED, 0.0 * INCIDENT, 0.0 * INCIDENT) == {}
 
 
+@pytest.mark.parametrize("wavelengths", [[550.0], [550.2, 550.4], [720.0, 800.0]])
+def test_wavelengths_without_a_peak_are_refused(wavelengths):
+    unused: Any = None
+    with pytest.raises(DiffractionError, match="two wavelengths"):
+        angular_variables(unused, wavelengths)
+
+
 LAM = np.arange(300.0, 701.0, 1.0)
 
 
@@ -60,3 +76,12 @@ def test_white_has_no_chroma_and_black_no_colour():
     assert white["chroma"] == pytest.approx(0.2, abs=0.2)  # equal energy is not quite D65
     assert "srgb" not in black
     assert black["S8"] == ""
+
+
+@pytest.mark.parametrize("detectors", [1, 12])
+def test_a_single_wavelength_is_drawn_as_points(detectors):
+    geometry = MeasurementGeometry(30.0, tuple(5.0 * np.arange(detectors)))
+    value = np.full((1, detectors), 0.3)
+    (axes,) = spectra_figure(Spectra(np.array([633.0]), value, geometry, "white")).axes
+    assert len(axes.lines) == detectors
+    assert {line.get_marker() for line in axes.lines} == {"o"}

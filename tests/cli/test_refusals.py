@@ -232,6 +232,7 @@ USAGE = {
     },
     "spectrum": {
         "--group a": "NAME=PATTERN",
+        "--group a-b=grating.npy --group a_b=grating.npy": "columns of 'a_b'",
         "": "give files",
         "grating.npy --detector 5:1:1": "5:1:1",
         "grating.npy --azimuth north": "north",

@@ -52,6 +52,13 @@ def test_a_csv_and_a_picture_are_written_and_named(run, scans, here):
     )
 
 
+def test_a_single_wavelength_is_measured_of_heights_too(run, scans):
+    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK[:2], "--wavelength-range", "633:633",
+              "-o", "one.csv")  # fmt: skip
+    assert ran.code == 0, ran.err
+    assert read("one.csv")["wl"].tolist() == 633.0
+
+
 def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
     ran = run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv")
     assert ran.code == 0, ran.err

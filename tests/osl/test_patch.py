@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 import re
@@ -16,6 +17,7 @@ from scipy.ndimage import map_coordinates
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.osl.export import pigment_of
 from mitsuba_diffraction.osl.patch import (
     BANDS,
     energy_texture,
@@ -181,3 +183,9 @@ def test_coat_pigment_and_stretch_are_those_of_the_surface(tmp_path, some_varian
     coat = re.search(r"#define COAT (\S+)", exported.shader.read_text(encoding="utf-8"))
     assert float(coat[1]) == pytest.approx(1.25, abs=1e-3)
     assert set(document["textures"]) == {"PowersFile", "DrawsFile"}
+
+
+def test_a_pigment_is_grey_in_a_mono_variant():
+    mi.set_variant("llvm_ad_mono")
+    nested = mi.load_dict({"type": "diffuse", "reflectance": 0.25})
+    assert pigment_of(dataclasses.replace(ENERGETIC, nested=nested)) == (0.25, 0.25, 0.25)

@@ -183,3 +183,9 @@ def test_mono_variants_refuse_wavelengths_outside_the_table(scene, wavelength):
     file.write_text(file.read_text().replace("</bsdf>", lit))
     with pytest.raises(md.DiffractionError, match="outside the table's 360 to 830 nm"):
         load_scene(file, {})
+
+
+def test_a_light_that_the_eye_does_not_see_is_refused():
+    assert SensorBands([400.0, 410.0, 420.0], {"s": [0.0, 0.0, 0.1], "m": [0.0] * 3}).first == 410.0
+    with pytest.raises(md.DiffractionError, match="no wavelength"):
+        assert SensorBands([400.0, 410.0], {"s": [0.0, 0.0]}).first

@@ -15,6 +15,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene import label
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.logo import areas, wavelengths_of
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from tests.support.logos import drawn, write_board
 from tests.support.scenes import gentle_patch
 
@@ -160,6 +161,20 @@ def test_the_ring_stands_where_its_first_order_reaches_the_camera(elevation: flo
     ring, tangential = label.geometry(elevations)
     sines = [np.sin(np.radians(angle - elevations)) for angle in (8.0, ring)]
     assert tangential == pytest.approx(sines[0] + sines[1])
+
+
+def test_files_that_a_mesh_names_are_copied_with_it(tmp_path: Path, parts: Any) -> None:
+    (tmp_path / "meshes").mkdir()
+    write_board(mesh := tmp_path / "meshes" / "board.gltf")
+    label.write(tmp_path / "made", parts, label.card(_ASPECT), mesh)
+    copy = load_mesh(tmp_path / "made" / "board.gltf")
+    np.testing.assert_array_equal(copy.positions, load_mesh(mesh).positions)
+
+
+def test_a_mesh_may_have_any_name(tmp_path: Path, parts: Any, gentle: dict[str, str]) -> None:
+    write_board(mesh := tmp_path / "größe & $up.obj")
+    scene = label.write(tmp_path / "made", parts, label.card(_ASPECT), mesh)
+    assert load_scene(scene, gentle).shapes()
 
 
 def test_what_cannot_bear_a_label_is_refused(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.scene.meshes import has_texcoords, mesh_arrays, mesh_faces
+from mitsuba_diffraction.scene.meshes import has_texcoords, mesh_arrays
 
 # a square of two triangles
 POSITIONS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
@@ -62,7 +62,7 @@ def test_bare_mesh_has_neither_normals_nor_texture_coordinates(names: tuple[str,
     bare = mesh_of(**dict(zip(names, (POSITIONS, FACES, False, False), strict=True)))
     assert not has_texcoords(bare)
     assert mesh_arrays(bare)[1:3] == (None, None)
-    np.testing.assert_array_equal(mesh_faces(bare), FACES)
+    np.testing.assert_array_equal(mesh_arrays(bare).faces, FACES)
 
 
 @pytest.mark.parametrize("name", ["scalar_rgb", "llvm_ad_rgb"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import mitsuba as mi
 import pytest
 from hypothesis import given
@@ -208,3 +210,16 @@ def test_files_of_heights_and_recipes_are_listed_too(tmp_path):
     (tmp_path / "scan.toml").write_text('source = "scan.npy"\npixel_size = 0.1\n')
     assert files_of(tmp_path / "scan.npy") == [tmp_path / "scan.npy"]
     assert {file.name for file in files_of(tmp_path / "scan.toml")} == {"scan.npy", "scan.toml"}
+
+
+def test_buffers_and_pictures_of_a_gltf_are_listed_too(tmp_path):
+    """A frame is rendered again, and a worker has the file, if one of them changes."""
+    names = ["../outside.bin", "parts/a%20b.bin", "data:,x", "lost.bin"]
+    document = {"buffers": [{"uri": name} for name in names], "images": [{"uri": "c.png"}, {}]}
+    (tmp_path / "outside.bin").write_bytes(b"x")
+    (tmp_path / "scene" / "parts").mkdir(parents=True)
+    scene = _scene(tmp_path / "scene", '<string name="filename" value="m.gltf"/>')
+    (tmp_path / "scene/m.gltf").write_text(json.dumps(document))
+    for name in ("parts/a b.bin", "c.png"):
+        (tmp_path / "scene" / name).write_bytes(b"x")
+    assert {file.name for file in files_of(scene)} == {"scene.xml", "m.gltf", "a b.bin", "c.png"}

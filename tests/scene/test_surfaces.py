@@ -127,6 +127,19 @@ def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):
         bsdfs(surface, {"spare": SETTINGS})
 
 
+@pytest.mark.parametrize("part", ['<bsdf type="plastic"', '<ref id="below"'])
+def test_what_lies_beneath_a_replaced_surface_is_kept(surface, part):
+    (surface / "scene.xml").write_text(f"""<scene version="3.0.0"><bsdf type="plastic" id="below"/>
+    <bsdf type="diffraction" id="skin">
+        <string name="filename" value="{surface / "grating.npy"}"/>
+        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
+        <boolean name="energy_conserving" value="false"/>{part} name="beneath"/>
+    </bsdf><shape type="sphere" id="ball"><ref id="skin"/></shape></scene>""")
+    text = bsdfs(surface, {"skin": SETTINGS})["ball"]
+    assert "Plastic" in text
+    assert text.count("Diffraction[") == 2  # on both sides
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_surface_that_another_one_hides_is_refused(surface, order):
     both = {"mat-Skin": SETTINGS, "elm__0": SETTINGS}
@@ -165,6 +178,7 @@ def test_each_edit_is_said_with_its_shapes_and_index(surface):
 
 
 def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
+    metal = f"{surface / 'grating.npy'}{SETTINGS},material=Al"
     xml = f"""<scene version="3.0.0"><default name="up" value="0"/><default name="r" value="1"/>
     <bsdf type="diffraction" id="skin">
         <string name="filename" value="{surface / "grating.npy"}"/>
@@ -173,11 +187,11 @@ def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
     </bsdf><shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>
     <shape type="disk"><ref id="skin"/></shape></scene>"""
     (surface / "scene.xml").write_text(xml.replace('<default name="up" value="0"/>', ""))
-    load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "r": "2"})  # of the sphere
+    load_scene(surface / "scene.xml", {"material:skin": metal, "r": "2"})  # of the sphere
     (surface / "scene.xml").write_text(xml.replace('scale" value="$r"', 'scale" value="$up"'))
-    load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "0.0"})  # the default
+    load_scene(surface / "scene.xml", {"material:skin": metal, "up": "0.0"})  # the default
     with pytest.raises(DiffractionError, match=r"up=2 changes nothing"):
-        load_scene(surface / "scene.xml", {"material:skin": "preset:dvd", "up": "2"})
+        load_scene(surface / "scene.xml", {"material:skin": metal, "up": "2"})
 
 
 def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surface):
@@ -191,8 +205,9 @@ def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surfa
         <bsdf type="diffuse" id="skin"/><shape type="sphere"><ref id="skin"/></shape>
         <include filename="$light"/></scene>"""
     )
-    values = {"material:skin": "preset:dvd", "light": str(surface / "lit.xml"), "power": "2"}
+    metal = f"{surface / 'grating.npy'}{SETTINGS},material=Al"
+    values = {"material:skin": metal, "light": str(surface / "lit.xml"), "power": "2"}
     assert len(load_scene(surface / "scene.xml", values).emitters()) == 1
     # the default in other words
-    values = {"material:skin": "preset:dvd", "light": str(surface / "dark.xml")}
+    values = {"material:skin": metal, "light": str(surface / "dark.xml")}
     assert not load_scene(surface / "scene.xml", values).emitters()

@@ -59,11 +59,12 @@ def write_board(file: Path, turn: int = 0, *, with_uv: bool = True) -> None:
     ]
     firsts = range(0, len(rows), 4)
     faces = [(a, a + k, a + k + 1) for a in firsts for k in (1, 2)]
-    if file.suffix == ".glb":
+    if file.suffix in (".glb", ".gltf"):
         trimesh = pytest.importorskip("trimesh")
         table = np.array(rows)
         visual = trimesh.visual.TextureVisuals(uv=table[:, 3:])
-        trimesh.Trimesh(table[:, :3], faces, visual=visual, process=False).export(file)
+        mesh = trimesh.Trimesh(table[:, :3], faces, visual=visual, process=False)
+        trimesh.Scene(mesh).export(file)
         return
     header = ["ply", "format ascii 1.0", f"element vertex {len(rows)}"]
     header += [f"property float {name}" for name in ("x", "y", "z", "s", "t")]

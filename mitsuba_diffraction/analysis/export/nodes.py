@@ -68,7 +68,7 @@ class ExportGrid(NamedTuple):
     Attributes
     ----------
     theta, phi : degrees from the normal, and from x towards y; rising.
-    wavelengths : nm, rising, evenly spaced if there are several.
+    wavelengths : nm, rising.
     resolution : number of nodes of outgoing directions, as each format has them.
     """
 
@@ -200,7 +200,8 @@ def laid(
 
     Lobes are integrated as they are rendered. A table of orders whose lobes are narrower than the
     nodes has its efficiencies laid there, order by order, so that no light is lost beyond the
-    horizon. A band of wavelengths around each wavelength is averaged, where there are several.
+    horizon. Where there are several wavelengths, a band around each is averaged, as wide as the
+    mean of its distances to both neighbours.
 
     Raises a DiffractionError if the variant cannot be evaluated, the surface transmits or varies,
     or its lobes are too narrow to be integrated.
@@ -222,7 +223,7 @@ def laid(
             "narrower one, whose lobes are still narrower than the file's nodes"
         )
     hats = nodes.hats(p, q)
-    step = float(grid.wavelengths[1] - grid.wavelengths[0]) if len(grid.wavelengths) > 1 else 0.0
+    bands = np.gradient(grid.wavelengths) if len(grid.wavelengths) > 1 else np.zeros(1)
     orders = _Orders(surface) if solved else None
     together = 1 if solved else max(_LAUNCH // len(p), 1)
     for first in range(0, len(lights), together):
@@ -231,13 +232,13 @@ def laid(
         wo, widths = zip(*(nodes.directions(wi, p, q) for wi in group), strict=True)
         solid = [area * part * (out[:, 2] > 0.0) for part, out in zip(widths, wo, strict=True)]
         if orders is not None:
-            light = [orders.on(nodes, wi, grid.wavelengths, step) for wi in group]
+            light = [orders.on(nodes, wi, grid.wavelengths, bands) for wi in group]
         else:
             lit = np.concatenate(solid) > 0.0
-            shift = (np.tile(number, len(group))[lit] - 0.5) * step
+            shift = np.tile(number, len(group))[lit] - 0.5
             pairs = np.repeat(group, len(p), axis=0)[lit], np.concatenate(wo)[lit]
             values = np.zeros((len(lit), len(grid.wavelengths)))
-            values[lit] = _evaluated(bsdf, *pairs, grid.wavelengths, shift)
+            values[lit] = _evaluated(bsdf, *pairs, grid.wavelengths, bands, shift)
             parts = zip(np.split(values, len(group)), solid, strict=True)
             light = [hats @ (part * areas[:, None]) for part, areas in parts]
         for part, areas, out in zip(light, solid, wo, strict=True):
@@ -262,8 +263,11 @@ def light_vectors(grid: ExportGrid) -> Real:
     return polar(np.maximum(theta, _LEAST_THETA).ravel(), phi.ravel())
 
 
-def _evaluated(bsdf: Any, wi: Real, wo: Real, wavelengths: Real, shift: Real) -> Real:
-    """Return f cosθo of pairs (n, 3), each at its shift from the wavelengths, (n, w)."""
+def _evaluated(bsdf: Any, wi: Real, wo: Real, wavelengths: Real, bands: Real, shift: Real) -> Real:
+    """Return f cosθo of pairs (n, 3), each at its shift from the wavelengths (w,), (n, w).
+
+    bands : (w,) widths of bands, nm; shift : (n,) in widths of the band.
+    """
     towards, out = (
         mi.Vector3f(*(upload(mi.Float, axis.astype(np.float32)) for axis in part.T))
         for part in (wi, wo)
@@ -273,7 +277,11 @@ def _evaluated(bsdf: Any, wi: Real, wo: Real, wavelengths: Real, shift: Real) ->
     result = np.empty((len(wo), len(wavelengths)))
     for first in range(0, len(wavelengths), packet):
         part = wavelengths[first : first + packet]
-        si.wavelengths = mi.UnpolarizedSpectrum(opaque(np.resize(part, packet))) + shifts
+        middle, band = (
+            mi.UnpolarizedSpectrum(opaque(np.resize(each[first : first + packet], packet)))
+            for each in (wavelengths, bands)
+        )
+        si.wavelengths = middle + band * shifts
         values = bsdf.eval(mi.BSDFContext(), si, out)
         dr.eval(values)
         for column, channel in zip(range(len(part)), values, strict=False):
@@ -292,14 +300,14 @@ class _Orders:
         self._turn = np.array([[turn[0], turn[1]], [-turn[1], turn[0]]])  # shading frame to patch
         self._lookup = lookup_in(self._table, Arrays, coated=True, elements=False)
 
-    def on(self, nodes: Nodes, wi: Real, wavelengths: Real, step: float) -> Real:
+    def on(self, nodes: Nodes, wi: Real, wavelengths: Real, bands: Real) -> Real:
         """Return the light of one direction on nodes, (nodes, wavelengths)."""
         pattern = sub_samples(_LOBE_SAMPLES)
         spread = ndtri(pattern[:, :2]) / (math.sqrt(2.0) * self._sigma)
         x, y = self._turn @ wi[:2]
         light = np.zeros((nodes.count, len(wavelengths)))
-        for column, middle in enumerate(wavelengths):
-            lam = middle + step * (pattern[:, 2] - 0.5)
+        for column, (middle, band) in enumerate(zip(wavelengths, bands, strict=True)):
+            lam = middle + band * (pattern[:, 2] - 0.5)
             every = orders_of(self._table, float(lam.min()))
             m, waves = every[:, None, :], lam[None, :]
             shifts = [m[..., k] * waves / (1e3 * d) for k, d in enumerate(self._table.periods)]

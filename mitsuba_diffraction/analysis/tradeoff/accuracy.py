@@ -111,6 +111,8 @@ def lit_pairs(field: HeightField, sigma: float, n: int, seed: int) -> LitPairs:
 
     A quarter lies within the lobe of order 0, a quarter is uniform over the hemisphere, and half
     lies in the lobes of orders drawn by their power: a grating is dark nearly everywhere else.
+
+    Raises a DiffractionError if the patch is flat, and has no such orders.
     """
     rng = np.random.default_rng(seed)
     lx, ly = field.extent
@@ -118,6 +120,8 @@ def lit_pairs(field: HeightField, sigma: float, n: int, seed: int) -> LitPairs:
     screen = np.exp(1j * 4 * np.pi / 0.55 * field.heights)  # 550 nm at normal incidence
     power = np.abs(np.fft.ifft2(screen)) ** 2
     power[0, 0] = 0.0
+    if field.range == 0.0:
+        raise DiffractionError(f"{field.name} is flat and diffracts no light; give another patch")
     bins = rng.choice(power.size, 50 * n, p=power.ravel() / power.sum())
     orders = np.stack(
         [
@@ -137,9 +141,11 @@ def lit_pairs(field: HeightField, sigma: float, n: int, seed: int) -> LitPairs:
     z2 = 1.0 - np.sum(tangential**2, axis=1)
     aimed = np.concatenate([tangential, np.sqrt(np.maximum(z2, 0.0))[:, None]], axis=1)
     outgoing = as_single(np.where((kinds == 1)[:, None], uniform, aimed))
-    # evanescent and grazing orders are replaced by the next ones of the same kind
+    # evanescent and grazing orders are replaced by the next ones of the same kind, or of any
     good = (kinds == 1) | (z2 > 0.01)
     chosen = np.concatenate([np.flatnonzero(good & (kinds == c))[: n // 4] for c in range(4)])
+    others = np.setdiff1d(np.flatnonzero(good), chosen)
+    chosen = np.concatenate([chosen, others[: n - len(chosen)]])
     wi, wo, lam = incident[chosen], outgoing[chosen], lam[chosen]
     near = np.hypot(*(wi + wo)[:, :2].T) * 2e3 * np.pi / lam * sigma <= 3.0
     return LitPairs(wi, wo, lam, near)

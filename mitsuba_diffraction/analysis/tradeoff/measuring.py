@@ -154,7 +154,14 @@ def measure(
         )
     timed = {name: partial(kernel_seconds, call) for name, call in calls.items()}
     times = rounds_of(timed, rounds, lambda done, total: progress(done, total, "timing"))
-    return [_with_times(result, times, lanes) for result in results]
+    return [
+        result if result.refused else replace(
+            result,
+            nanoseconds=float(np.median(times[result.setting.name])) / lanes * 1e9,
+            relative=ratio(times[result.setting.name], times[""]),
+        )
+        for result in results
+    ]  # fmt: skip
 
 
 def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
@@ -165,20 +172,6 @@ def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
     wavenumber = upload(mi.Float, k)
     sums = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
     return np.array(sums, float)
-
-
-def _with_times(
-    result: MeasuredSetting, times: dict[str, list[float]], lanes: int
-) -> MeasuredSetting:
-    """Add the times of `eval` to a result, unless its table was refused."""
-    if result.refused:
-        return result
-    seconds = times[result.setting.name]
-    return replace(
-        result,
-        nanoseconds=float(np.median(seconds)) / lanes * 1e9,
-        relative=ratio(seconds, times[""]),
-    )
 
 
 def rows(results: Sequence[MeasuredSetting]) -> Iterator[dict[str, Any]]:

@@ -3,7 +3,7 @@
 Contents
 --------
 trimesh      `TriangleMesh`: arrays; `oriented_mesh`: one whose patch follows a field
-mesh_files   `load_mesh`, `write_ply`; PLY files of polygons
+mesh_files   `read_mesh`, `write_ply`; PLY files of polygons
 mesh_indices  mesh files checked before Mitsuba reads them
 interchange  meshes of glTF and USD files
 tangents     `check_tangents`: whether a mesh has the tangents that a patch needs, where they break
@@ -13,12 +13,13 @@ directions   `direction_field`: a smooth field of directions on any mesh
 from __future__ import annotations
 
 from .directions import DirectionField, direction_field
-from .mesh_files import load_mesh, load_orientation, write_ply
+from .mesh_files import MeshFile, load_mesh, load_orientation, read_mesh, write_ply
 from .tangents import TangentReport, check_tangents
 from .trimesh import TriangleMesh, oriented_mesh
 
 __all__ = [
     "DirectionField",
+    "MeshFile",
     "TangentReport",
     "TriangleMesh",
     "check_tangents",
@@ -26,5 +27,6 @@ __all__ = [
     "load_mesh",
     "load_orientation",
     "oriented_mesh",
+    "read_mesh",
     "write_ply",
 ]

@@ -235,24 +235,19 @@ def _following(surface: WeldedMesh, guide: Complex, distance: float) -> Complex:
 
 def _current(surface: WeldedMesh) -> Real:
     """Unit vectors along the current from one end of each part to the other, (k, 3)."""
-    count, part = surface.parts()
+    _, part = surface.parts()
     n = len(surface.positions)
     i, j = surface.edges.T
     length = np.linalg.norm(surface.positions[i] - surface.positions[j], axis=1)
     graph = csr_array(coo_array((length, (i, j)), shape=(n, n)))
     source = np.zeros(n)
-    for number in range(count):
-        inside = np.flatnonzero(part == number)
-        if len(inside) < 3:
-            continue
-        # the farthest place from anywhere is one end, the farthest from there the other
-        start = inside[0]
-        ends = []
-        for _ in range(2):
-            away = dijkstra(graph, directed=False, indices=start)[inside]
-            start = inside[np.argmax(away)]
-            ends.append(start)
-        source[ends[0]], source[ends[1]] = -1.0, 1.0
+    # the farthest place from anywhere in a part is one end, the farthest from there the other
+    _, ends = np.unique(part, return_index=True)
+    for current in (-1.0, 1.0):
+        away = dijkstra(graph, directed=False, indices=ends, min_only=True)
+        order = np.lexsort([-away, part])
+        ends = order[np.unique(part[order], return_index=True)[1]]
+        source[ends] += current  # none of a vertex without triangles
     laplacian = surface.laplacian(1.0)
     small = _SHIFT * laplacian.diagonal().sum() / n
     potential = splu(csc_array(laplacian + diags_array(np.full(n, small)))).solve(source)

@@ -8,6 +8,7 @@ import re
 import struct
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -17,7 +18,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import MeshArrays, SmoothMesh, mesh_arrays
+from ..meshes import SmoothMesh, mesh_arrays
 from .interchange import interchange_mesh
 from .mesh_indices import CODES, Element, any_line_begins, check_mesh, parsed_header, ply_header
 from .trimesh import TriangleMesh, vertex_normals
@@ -34,53 +35,72 @@ _CODES = {name: np.dtype(code).char for name, code in CODES.items()}
 _NORMAL, _CORNER = re.compile(rb"(?m)^vn .*$"), re.compile(rb"(?<= )(\d+)(/\d+)?/{1,2}\d+(?=\s|$)")
 
 
-def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
-    """Read a mesh file; where it has no normals, smooth ones are made by `vertex_normals`.
+class MeshFile(NamedTuple):
+    """Contents of a mesh file.
+
+    Attributes
+    ----------
+    file : the file.
+    mesh : the triangles, with the vertices that they name.
+    own_normals : whether the file holds vertex normals; otherwise `vertex_normals` has made them.
+    orientation : (n, 2) of the attribute vertex_orientation, or None.
+    materials : (m,) number of each triangle's material in a glTF file; None for other files.
+    """
+
+    file: Path
+    mesh: SmoothMesh
+    own_normals: bool
+    orientation: Real | None
+    materials: Whole | None
+
+
+def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
+    """Read all that a mesh file holds; where it has no normals, `vertex_normals` makes smooth ones.
 
     Reads what Mitsuba reads, .ply, .obj, .serialized, PLY files of polygons, glTF and USD. Normals
     of an OBJ file are rebuilt, with a warning, if one has length 0.
 
     Raises a DiffractionError if the file cannot be read, or is not a mesh of these kinds.
     """
-    positions, normals, uv, faces, _ = _arrays(Path(path))[0]
-    if normals is None:
-        normals = vertex_normals(positions, faces, uv)
-    return SmoothMesh(positions, normals, uv, faces)
-
-
-def has_own_normals(path: str | os.PathLike[str]) -> bool:
-    """Whether the file of a mesh holds vertex normals; otherwise `load_mesh` makes smooth ones."""
-    return _arrays(Path(path))[0].normals is not None
-
-
-def load_materials(path: str | os.PathLike[str]) -> Whole | None:
-    """Return the number of each triangle's material in a glTF file, (m,); None for other files."""
-    return _arrays(Path(path))[0].materials
-
-
-def load_orientation(path: str | os.PathLike[str]) -> Real | None:
-    """Read the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
-    return _arrays(Path(path))[1]
-
-
-def _arrays(file: Path) -> tuple[MeshArrays, Real | None]:
-    """Return the arrays of a mesh file as it has them, and its attribute vertex_orientation."""
+    file, turns = Path(path), None
     if file.suffix.lower() not in MESHES:
         raise DiffractionError(
             f"mesh '{file}': its name must end in {', '.join(MESHES)}; convert it to PLY or OBJ"
         )
     readable_file(file)
     if file.suffix.lower() in (*GLTF, *USD):
-        return interchange_mesh(file), None
-    if mi.variant() is None:
-        mi.set_variant("scalar_rgb")
-    mesh, turns = _load(file), None
-    if mesh.has_attribute(ORIENTATION):
-        turns = np.array(mi.traverse(mesh)[ORIENTATION], dtype=np.float64)
-        turns = turns.reshape(mesh.vertex_count(), -1)[:, :2]
-    arrays = mesh_arrays(mesh)
-    # Mitsuba's normals have seams where texture coordinates have
-    return arrays if _states_normals(file) else arrays._replace(normals=None), turns
+        arrays = interchange_mesh(file)
+    else:
+        if mi.variant() is None:
+            mi.set_variant("scalar_rgb")
+        loaded = _load(file)
+        if loaded.has_attribute(ORIENTATION):
+            turns = np.array(mi.traverse(loaded)[ORIENTATION], dtype=np.float64)
+            turns = turns.reshape(loaded.vertex_count(), -1)[:, :2]
+        arrays = mesh_arrays(loaded)
+        # Mitsuba's normals have seams where texture coordinates have
+        arrays = arrays if _states_normals(file) else arrays._replace(normals=None)
+    faces, named = arrays.faces, np.zeros(len(arrays.positions), bool)
+    named[faces] = True
+    if not named.all():  # other vertices would count in the mesh's size
+        faces = (np.cumsum(named) - 1)[faces]
+    positions = arrays.positions[named]
+    own, uv, turns = (
+        None if rows is None else rows[named] for rows in (arrays.normals, arrays.uv, turns)
+    )
+    normals = vertex_normals(positions, faces, uv) if own is None else own
+    mesh = SmoothMesh(positions, normals, uv, faces)
+    return MeshFile(file, mesh, own is not None, turns, arrays.materials)
+
+
+def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
+    """Return the triangles of `read_mesh`."""
+    return read_mesh(path).mesh
+
+
+def load_orientation(path: str | os.PathLike[str]) -> Real | None:
+    """Return the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
+    return read_mesh(path).orientation
 
 
 def _states_normals(file: Path) -> bool:
@@ -98,7 +118,10 @@ def _load(file: Path) -> mi.Mesh:
     try:
         return _read(file, kind)
     except _UNREAD as error:
-        triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
+        triangles = None
+        # numbers and names of a damaged header or body
+        with contextlib.suppress(struct.error, ValueError, LookupError, OverflowError, MemoryError):
+            triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
         if kind == "obj" and "invalid vertex normal" in str(error):
             warn(f"mesh '{file}': a vertex normal has length 0; all are rebuilt from the triangles")
             triangles = _CORNER.sub(rb"\1\2", _NORMAL.sub(b"", file.read_bytes()))
@@ -155,14 +178,6 @@ def triangulated_ply(data: bytes) -> bytes | None:
 
     Faces must come after vertices; the result has nothing else. None for other files.
     """
-    try:
-        return _triangulated(data)
-    # numbers and names of a damaged header or body
-    except (struct.error, ValueError, LookupError, OverflowError, MemoryError):
-        return None
-
-
-def _triangulated(data: bytes) -> bytes | None:
     header = parsed_header(data, "")
     if header is None or [e.name for e in header.elements[:2]] != ["vertex", "face"]:
         return None

@@ -41,16 +41,6 @@ TURN = 30.0  # degrees between neighbours from which on a seam shows
 FLAT = 1e-3  # a smaller share of the median ratio of texture area to surface area counts as 0
 
 
-def _turning(orientation: Real) -> Bools:
-    """(m, 3) whether a field turns by over 60° on the way from corner n to corner n + 1.
-
-    orientation : (m, 3, 2) cosine and sine of the angle from each triangle's tangent.
-    """
-    turn = unit(orientation)
-    cosine = (turn * np.roll(turn, -1, axis=1)).sum(axis=2)
-    return np.asarray(cosine < np.cos(np.radians(BREAK)))
-
-
 def _length_of_breaks(places: Real, faces: Whole, crossed: Bools, jumps: Whole) -> float:
     """Total length of the lines along which a field breaks, in the unit of the positions.
 
@@ -60,7 +50,7 @@ def _length_of_breaks(places: Real, faces: Whole, crossed: Bools, jumps: Whole) 
     Parameters
     ----------
     places, faces : (n, 3) positions, each once; (m, 3) indices of them.
-    crossed : (m, 3) edges along which the field turns, from `_turning`.
+    crossed : (m, 3) whether the field turns by over 60° from corner n to corner n + 1.
     jumps : (e, 2) pairs of places: edges across which the field jumps by over 60 degrees.
     """
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)  # (m, 3, 2)
@@ -261,7 +251,8 @@ def check_tangents(
     places, welded = np.unique(positions, axis=0, return_inverse=True)
     corners = welded.reshape(-1)[faces]
     beside, jumps = _jumps(corners, front, tangent, turn[faces], good)
-    crossed = _turning(turn[faces])
+    turns = unit(turn[faces])
+    crossed = (turns * np.roll(turns, -1, axis=1)).sum(axis=2) < np.cos(np.radians(BREAK))
     turning = beside | crossed.any(axis=1)
     lengths = np.linalg.norm(dp_du[good], axis=1), np.linalg.norm(dp_dv[good], axis=1)
     return TangentReport(

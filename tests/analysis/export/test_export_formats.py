@@ -317,6 +317,23 @@ def csv_power(path, theta, phi):
     return wo.reshape(-1, 3), (between * wo[..., 2] * solid).ravel()
 
 
+@pytest.mark.parametrize("solved", [False, True], ids=["heights", "orders"])
+def test_each_wavelength_has_a_band_of_its_own(tmp_path, solved):
+    """The distance of the first two is no measure of the others, nor reaches beyond the table."""
+    surface = grating(material="Al")
+    if solved:
+        thin_grating(1.2, counts=(4, 4, 2)).save(tmp_path / "table.nc")
+        surface = md.bsdf_dict(tmp_path / "table.nc", coherence_width=60.0)
+    bsdf, values = mi.load_dict(surface), []
+    for wavelengths in ([420.0, 690.0, 700.0], [690.0, 700.0]):
+        grid = ExportGrid(np.array([20.0]), np.array([0.0]), np.array(wavelengths), 12)
+        scatter.save_csv(bsdf, tmp_path / "a.csv", grid)
+        rows = read_columns(tmp_path / "a.csv").numbers
+        values.append(rows[rows[:, 4] == 700.0, 5])
+    assert values[0].max() > 0.0
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-4, atol=1e-5 * values[0].max())
+
+
 def test_each_order_of_a_csv_has_the_table_s_light(tmp_path):
     """Within 1 %, of a turned grating: orders 0.2° wide, nodes 5° apart."""
     table = thin_grating(1.2, counts=(6, 5, 2), wavelengths=(500.0, 600.0))

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.cli.scene_options import change
-from mitsuba_diffraction.scene.frames import Frame
+from mitsuba_diffraction.scene.frames import Frame, write_film
 from mitsuba_diffraction.scene.parameters import values_of_frames
 
 # A uniform sky alone: every pixel is as bright as `light` says.
@@ -162,6 +162,23 @@ def test_a_film_holds_all_frames_without_end(render, suffix):
         film.seek(1)
         film.load()
         assert film.info["duration"] == 100
+
+
+@pytest.mark.parametrize("fps", [24.0, 30.0, 60.0])
+@pytest.mark.parametrize("suffix", [".webp", ".gif"])
+def test_a_film_is_as_long_as_its_frames(tmp_path, suffix, fps):
+    """GIF has frames of whole hundredths of a second."""
+    files = [tmp_path / f"{n}.png" for n in range(30)]
+    for n, file in enumerate(files):
+        Image.new("RGB", (2, 2), (8 * n, 0, 0)).save(file)
+    write_film(files, tmp_path / f"film{suffix}", fps)
+    seconds = 0.0
+    with Image.open(tmp_path / f"film{suffix}") as film:
+        for n in range(film.n_frames):
+            film.seek(n)
+            film.load()
+            seconds += 1e-3 * film.info["duration"]
+    assert seconds == pytest.approx(len(files) / fps, abs=0.006)
 
 
 def test_an_mp4_holds_all_frames(render):

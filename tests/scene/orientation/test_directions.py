@@ -112,6 +112,19 @@ def test_parts_that_do_not_touch_have_fields_of_their_own():
         assert field.indices.sum() == 4
 
 
+def test_each_of_many_parts_has_a_current_of_its_own():
+    """Strips of two triangles: in all of them alike, as if each were alone."""
+    strip = np.array([[0.0, 0, 0], [2, 0, 0], [2, 0.5, 0], [0, 0.5, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    places = 3.0 * np.arange(3000)[:, None, None] * [0.0, 1.0, 0.0] + strip
+    normals = np.tile([0.0, 0.0, 1.0], (len(places) * 4, 1))
+    joined = faces + 4 * np.arange(len(places))[:, None, None]
+    many = direction_field(places.reshape(-1, 3), normals, joined.reshape(-1, 3), "body")
+    alone = direction_field(strip, normals[:4], faces, "body")
+    same = np.abs((many.directions.reshape(-1, 4, 3) * alone.directions).sum(axis=2))
+    assert same.min() > 1.0 - 1e-6
+
+
 @pytest.mark.usefixtures("some_variant")
 @pytest.mark.parametrize("own_uv", [True, False])
 def test_mitsuba_lays_the_patch_along_the_field(own_uv: bool, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.scene.orientation.directions import direction_field
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
 from tests.support import ROOT
@@ -104,21 +104,6 @@ def test_normals_without_length_are_rebuilt_with_a_note(tmp_path, some_variant, 
     assert (mesh.uv is not None) == ("/{0}/" in corner)
 
 
-def test_turning_tangents_are_named() -> None:
-    positions, normals, uv, faces = _sheet(16)
-    # the texture turns by a right angle half-way
-    right = positions[faces].mean(axis=1)[:, 0] > 0.5
-    split = faces.copy()
-    split[right] += len(positions)
-    turned = np.stack([uv[:, 1], -uv[:, 0]], axis=1)
-    report = check_tangents(
-        np.tile(positions, (2, 1)), np.tile(normals, (2, 1)), np.concatenate([uv, turned]), split
-    )
-    # one triangle in each cell on both sides of the seam
-    assert report.turning == pytest.approx(2 * 0.5 / 16)
-    assert not report.usable
-
-
 def test_stretch_is_the_ratio_of_the_tangents() -> None:
     positions, normals, uv, faces = _sheet()
     uv[:, 0] /= 3
@@ -184,6 +169,19 @@ def test_a_written_mesh_reads_back(tmp_path: Path) -> None:
     read = load_mesh(tmp_path / "sheet.ply")
     for before, after in zip((positions, normals, uv, faces), read, strict=True):
         np.testing.assert_array_equal(before, after)
+
+
+def test_vertices_of_no_triangle_are_left_out(tmp_path: Path) -> None:
+    """One far away would shrink the mesh on the stage."""
+    positions, normals, uv, faces = _sheet(2)
+    turns = np.tile([0.0, 1.0], (len(positions), 1))
+    arrays = (np.insert(a, 3, 1000.0, axis=0) for a in (positions, normals, uv))
+    mesh = TriangleMesh(*arrays, faces + (faces >= 3), np.insert(turns, 3, 0.5, axis=0))
+    write_ply(tmp_path / "sheet.ply", mesh)
+    read = read_mesh(tmp_path / "sheet.ply")
+    for before, after in zip((positions, normals, uv, faces), read.mesh, strict=True):
+        np.testing.assert_array_equal(before, after)
+    np.testing.assert_array_equal(read.orientation, turns)
 
 
 def test_arrays_that_do_not_fit_are_refused() -> None:
@@ -299,18 +297,16 @@ def test_singular_points_are_no_lines(cells, along):
 
 @pytest.mark.parametrize("cells", [8, 64])
 def test_a_seam_of_the_texture_is_as_long_however_fine_the_mesh(cells):
-    grid = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(0, 1, cells + 1)], indexing="ij"))
-    x, y = grid
-    positions = np.stack([x, y, 0 * x], axis=1)
-    normals = np.tile([0.0, 0.0, 1.0], (len(x), 1))
-    faces = grid_faces(np.arange(len(x)).reshape(cells + 1, cells + 1))
+    positions, normals, uv, faces = _sheet(cells)
     right = positions[faces].mean(axis=1)[:, 0] > 0.5
-    faces[right] += len(x)  # where u runs along y
-    uv = np.concatenate([np.stack([x, y], axis=1), np.stack([y, -x], axis=1)])
+    faces[right] += len(positions)  # where u runs along y
+    uv = np.concatenate([uv, np.stack([uv[:, 1], -uv[:, 0]], axis=1)])
     two = np.tile(positions, (2, 1)), np.tile(normals, (2, 1))
     report = check_tangents(*two, uv, faces)
     assert report.broken == pytest.approx(1.0)
+    # one triangle in each cell on both sides of the seam
+    assert report.turning == pytest.approx(2 * 0.5 / cells)
     assert not report.usable
     # turned back by the orientation, nothing is left of it
-    back = np.repeat([[1.0, 0.0], [0.0, -1.0]], len(x), axis=0)
+    back = np.repeat([[1.0, 0.0], [0.0, -1.0]], len(positions), axis=0)
     assert check_tangents(*two, uv, faces, back).usable
