@@ -96,9 +96,10 @@ def order_mixture(
     if table.grid.coherent:  # powers between the bins have the lobes in them
         apart_by = max(axis.frequency[1] - axis.frequency[0] for axis in axes)
         smoothing = math.sqrt(max(smoothing**2 - lobe**2, (_BRIDGED * apart_by) ** 2))
+        pitch = min(0.5 * math.hypot(smoothing, lobe), smoothing / _BRIDGED)
     else:
         smoothing = max(smoothing, lobe)
-    pitch = 0.5 * smoothing
+        pitch = 0.5 * smoothing
     half = math.ceil(reach / pitch) + 1
     grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
     splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
