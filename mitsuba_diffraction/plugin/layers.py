@@ -220,9 +220,9 @@ class UnderFilm(Material):
         index, thickness = self.numbers()
         if 2.0 * index.real * thickness > COHERENCE:
             return (
-                f"film_thickness={thickness:g} nm of index {index.real:.4g}: 2 n d must be at most "
-                f"{COHERENCE:g} nm, over which light is coherent (λ²/Δλ of a band of 25 nm at 550 "
-                "nm); a thicker layer is a coat: coat_ior"
+                f"film_thickness={thickness:g} nm of film_eta={index.real:.4g} (film_ior): 2 n d "
+                f"must be at most {COHERENCE:g} nm, over which light is coherent (λ²/Δλ of a band "
+                "of 25 nm at 550 nm); a thicker layer is a coat: coat_ior"
             )
         if math.exp(-8.0 * math.pi * index.imag * thickness / self._range[0]) < LEAST_THROUGH:
             return (

@@ -65,6 +65,15 @@ class DirectionGrid:
         count = self.azimuthal * parts
         return theta, np.asarray((np.arange(count) + 0.5) * (2.0 * math.pi / count))
 
+    def turns(self, phi: Real) -> Turns:
+        """Return the turns of the grid by azimuths (n,), rad."""
+        cells = np.round(np.mod(phi, 2.0 * math.pi) * (self.azimuthal / (2.0 * math.pi)), 9)
+        whole = np.floor(cells).astype(np.int64)
+        offsets, which = np.unique(cells - whole, return_inverse=True)
+        offsets *= 2.0 * math.pi / self.azimuthal
+        members = [np.flatnonzero(which == n) for n in range(len(offsets))]
+        return Turns(list(zip(offsets.tolist(), members, strict=True)), whole)
+
     def interpolation(self, theta: ArrayLike, phi: ArrayLike) -> LinearMap:
         """Bilinear interpolation to directions (rad), of any one shape."""
         row, column = np.broadcast_arrays(
@@ -81,6 +90,22 @@ class DirectionGrid:
         starts, nodes = np.arange(0, len(data) + 1, 4), (self.polar + 1) * self.azimuthal
         corners = scipy.sparse.csr_array((data, indices, starts), shape=(row.size, nodes))
         return LinearMap(corners, row.shape)
+
+
+class Turns(NamedTuple):
+    """Turns (n,) of a grid about the normal.
+
+    offsets : turns by less than a cell, rad, each with the places 0 … n − 1 that have it.
+    cells : by which the grid is turned, (n,).
+    """
+
+    offsets: list[tuple[float, NDArray[np.integer]]]
+    cells: NDArray[np.integer]
+
+    def seen(self, values: Single) -> Single:
+        """Values on the grid as they are seen from the turned ones, (n, nodes)."""
+        columns = (self.cells[:, None] + np.arange(values.shape[-1])) % values.shape[-1]
+        return np.take(values, columns, axis=-1).swapaxes(0, 1).reshape(len(columns), -1)
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,8 @@ def _window_sums(
     kernels = (_gaussian(grid.exponents[0]), _gaussian(grid.exponents[1]))
     rest = weighted_sum(table, qx, qy, kappa, kernels, grid.taps, place)
     order_0 = order_0_sum(table, qx, qy, kappa, kernels)
-    others, zeroth, cosine = np.maximum(rest.real, 0.0), order_0.real, np.zeros_like(qx)
+    others, zeroth = np.maximum(rest.real, 0.0), np.maximum(order_0.real, 0.0)
+    cosine = np.zeros_like(qx)
     if grid.coherent:
         others, zeroth = np.abs(rest) ** 2, np.abs(order_0) ** 2
         cosine = (rest * np.conj(order_0)).real / np.maximum(np.sqrt(others * zeroth), 1e-300)

@@ -29,6 +29,9 @@ _JOINED = 1.0
 _SAMPLED, _FINE = 0.8, 0.15
 #: Least deviation that smooths samples, in their distance.
 _BRIDGED = 0.7
+#: Distance of a window's densities, in that deviation: they are read at the nearest place. With 1.0
+#: albedos were up to 0.005 off, twice as much as with 0.7 or less.
+_READ = 0.7
 #: Largest lobe, in the density's smoothing, of a window's samples that are summed on their own.
 NARROW = 0.25
 
@@ -96,9 +99,10 @@ def order_mixture(
     if table.grid.coherent:  # powers between the bins have the lobes in them
         apart_by = max(axis.frequency[1] - axis.frequency[0] for axis in axes)
         smoothing = math.sqrt(max(smoothing**2 - lobe**2, (_BRIDGED * apart_by) ** 2))
+        pitch = min(0.5 * math.hypot(smoothing, lobe), _READ * smoothing)
     else:
         smoothing = max(smoothing, lobe)
-    pitch = 0.5 * smoothing
+        pitch = 0.5 * smoothing
     half = math.ceil(reach / pitch) + 1
     grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
     splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]

@@ -111,3 +111,15 @@ def test_crops_of_a_rough_surface_have_the_light_of_the_whole():
         assert np.all(found < 2.0 * truth), (degrees, found / truth)
         seen = np.sin(np.radians(degrees)) / wavelengths > 2e-3 / (side * pixel)
         assert np.all(found[seen] > 0.5 * truth[seen]), (degrees, found / truth)
+
+
+def test_where_order_0_is_dark_all_light_is_a_number():
+    """A sinusoid of amplitude a has no order 0 at κa = 2.4048, where a series may be below 0."""
+    wave = 0.2 * np.sin(2.0 * np.pi * np.arange(40) / 40) * np.ones((4, 1))
+    field = md.HeightField(wave, 0.05, periodic=True)
+    table = md.DiffractionTable.build(field, coherence_width=3.0, tolerance=0.1, basis="chebyshev")
+    kappa = np.linspace(2.3, 2.5, 400) / 0.2
+    assert table.order_0_at(kappa).min() < 0.0  # there is such light
+    wi, up = polar(20.0, 0.0), np.array([0.0, 0.0, 1.0])
+    wavelength = 2e3 * np.pi * (wi + up)[2] / kappa
+    assert np.all(table.brdf(wi, up, wavelength) >= 0.0)

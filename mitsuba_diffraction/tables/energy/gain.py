@@ -75,7 +75,13 @@ class PathGain:
         index = self.path.index
         fine = thick(index) or (isinstance(index, float) and index < 1.0)
         polar = 2 * POLAR - 1 if fine else POLAR
-        return self._ratio(*_nodes(polar))
+        cosine, cos_turn = _nodes(polar)
+        if self.path.came != self.path.left:
+            return self._ratio(cosine[:, None, None], cosine[:, None], cos_turn)
+        i, o = np.triu_indices(polar)  # G is symmetric
+        table = np.empty((polar, polar, AZIMUTHS))
+        table[i, o] = table[o, i] = self._ratio(cosine[i, None], cosine[o, None], cos_turn)
+        return table
 
     def _ratio(self, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
         """G over `Path.common` at these cosines."""
@@ -98,8 +104,8 @@ def thick(index: object) -> bool:
     return isinstance(index, Filmed) and index.advance > THICK
 
 
-def _nodes(polar: int) -> tuple[Real, Real, Real]:
-    """Return cosines of θi, θo and the azimuth between, at which G is tabulated."""
+def _nodes(polar: int) -> tuple[Real, Real]:
+    """Return cosines of θi or θo, and of the azimuth between, at which G is tabulated."""
     angle = 0.5 * np.pi * (1.0 - np.linspace(1.0, 0.0, polar) ** 2)  # denser towards grazing
     cosine = np.maximum(np.cos(angle), LEAST_COSINE)
-    return cosine[:, None, None], cosine[:, None], np.cos(np.linspace(0.0, np.pi, AZIMUTHS))
+    return cosine, np.cos(np.linspace(0.0, np.pi, AZIMUTHS))

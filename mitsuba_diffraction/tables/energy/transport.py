@@ -17,7 +17,7 @@ over the frequencies that are visible, with κ = k w times the height scale and 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -44,7 +44,7 @@ LEAST_WEAK = 2e-3
 #: Width of order 0's lobe, in direction cosines, above which it is summed over all directions, as G
 #: differs from one azimuth to another. The quadrature resolves lobes half as wide.
 _WIDE = 0.08
-#: Pairs of a direction and an order that are looked at together.
+#: Pairs of a direction and an order, or another direction, that are looked at together.
 _PAIRS = 1 << 16
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
@@ -134,11 +134,9 @@ class Transport:
         self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
         self._parts: list[Callable[[Single], Single]] = [self._order_0(theta, phi, grid)]
         if orders.has_weak:
-            half, nodes = grid.half, orders.nodes
-            shares = self._weak_shares(half.theta, half.phi)
-            to_nodes = grid.interpolation(nodes.theta, half.phi[:, None] + nodes.azimuth)
-            here = half.interpolation(theta[:, None], phi)
-            self._parts.append(lambda s: here(np.einsum("tpn,pn->tp", shares, to_nodes(s))))
+            here = grid.half.interpolation(theta[:, None], phi)
+            weak = self._weak(grid.half, grid)
+            self._parts.append(lambda s: here(weak(s)))
         if orders.strong:
             self._parts.append(self._strong(theta, phi, grid))
 
@@ -158,15 +156,34 @@ class Transport:
     def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the light of order 0."""
         if self._width_0 > _WIDE:
-            nodes = self._orders.nodes_within(self._path.left.critical_sine)
-            every = self._order_0_everywhere(theta, nodes)
-            to_nodes = grid.interpolation(nodes.theta, phi[:, None] + nodes.azimuth)
-            return lambda s: np.asarray(every @ to_nodes(s).T, np.float32)
+            return self._order_0_everywhere(theta, phi, grid)
         shares = self._order_0_shares(theta, grid)
         mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
         return lambda s: np.asarray(shares @ mirrored(s), np.float32)
 
-    def _order_0_everywhere(self, theta: Real, nodes: Quadrature) -> Real:
+    def _order_0_everywhere(
+        self, theta: Real, phi: Real, grid: DirectionGrid
+    ) -> Callable[[Single], Single]:
+        """Return the map from weights on a grid to order 0, which goes to all directions."""
+        nodes = self._orders.nodes_within(self._path.left.critical_sine)
+        shares = np.concatenate(
+            [self._order_0_at(theta[rows], nodes) for rows in _blocks(len(theta), len(nodes.x))]
+        )
+        turns = grid.turns(phi)
+        kernels = [
+            (turned, shares @ grid.interpolation(nodes.theta, nodes.azimuth + offset).matrix)
+            for offset, turned in turns.offsets
+        ]
+
+        def light(s: Single) -> Single:
+            found, pages = np.empty((len(theta), len(phi)), np.float32), turns.seen(s)
+            for turned, kernel in kernels:
+                found[:, turned] = kernel @ pages[turned].T
+            return found
+
+        return light
+
+    def _order_0_at(self, theta: Real, nodes: Quadrature) -> Single:
         """Return shares (t, n) of order 0 that go to the quadrature's directions."""
         cos_i, sine = self._start(theta[:, None])
         path = self._path
@@ -174,7 +191,7 @@ class Transport:
         lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
         power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
         gain, face = self._mirrored(cos_i, nodes.cosine, np.cos(nodes.azimuth))
-        return np.asarray(lobe * (gain * power + face), np.float64)
+        return np.asarray(lobe * (gain * power + face), np.float32)
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
         """Return shares (t, rows) of order 0 that go to the polar angles of a grid.
@@ -203,8 +220,29 @@ class Transport:
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(np.asarray(parts, np.float32)).matrix.toarray()
 
-    def _weak_shares(self, theta: Real, phi: Real) -> Single:
-        """Return shares (t, p, n) of the quadrature's directions, at azimuths turned by phi."""
+    def _weak(self, half: DirectionGrid, grid: DirectionGrid) -> Callable[[Single], Single]:
+        """Return the map from weights on a grid to the weak orders' light, at directions of `half`.
+
+        Sums over the quadrature become sums over the grid, as seen from each azimuth.
+        """
+        nodes, turns = self._orders.nodes, grid.turns(half.phi)
+        to_grids = [
+            (turned, grid.interpolation(nodes.theta, nodes.azimuth + offset).matrix)
+            for offset, turned in turns.offsets
+        ]
+        kernel = np.empty((half.polar + 1, half.azimuthal, grid.ones.size), np.float32)
+        for rows in _blocks(len(kernel), len(nodes.x)):
+            pages = self._weak_pages(half.theta[rows], half.phi)
+            for sums, shares in zip(kernel[rows], pages, strict=True):
+                for turned, to_grid in to_grids:
+                    sums[turned] = shares[turned] @ to_grid
+        return lambda s: np.einsum("tpg,pg->tp", kernel, turns.seen(s))
+
+    def _weak_pages(self, theta: Real, phi: Real) -> Iterator[Single]:
+        """Yield for each polar angle the shares (p, n) of the quadrature's directions.
+
+        A page at a time stays in a processor's cache.
+        """
         mixture, k, nodes = self._orders.mixture, self._k, self._orders.nodes
         cos_i, sine = self._start(theta[:, None])
         gain = self._gain(cos_i, nodes.cosine, nodes.azimuth)
@@ -221,27 +259,27 @@ class Transport:
         x, y = scale * (nodes.x + sine), scale * nodes.y
         sin, cos = np.sin(phi)[:, None], np.cos(phi)[:, None]
         rows, columns = mixture.density.shape[1:]
-        shares = np.zeros((len(theta), len(phi), len(nodes.x)), np.float32)
         factors = []
         for density, gain in densities:
             factor = (k**2 * nodes.weights * nodes.cosine * gain).astype(np.float32)
             factors.append((density.ravel(), factor * (1.0 - upper_share), factor * upper_share))
-        for n, page in enumerate(shares):  # one polar angle at a time stays in a processor's cache
+        for n in range(len(theta)):
             column = (cos * x[n] - sin * y + 0.5 * columns).astype(np.int32)
             row = (sin * x[n] + cos * y + 0.5 * rows).astype(np.int32)
             np.clip(column, 0, columns - 1, out=column)
             np.clip(row, 0, rows - 1, out=row)
             index = (lower[n] * rows + row) * columns + column
+            page = np.zeros(index.shape, np.float32)
             for flat, of_lower, of_upper in factors:
                 page += flat.take(index) * of_lower[n]
                 page += flat.take(index + rows * columns) * of_upper[n]
-        return shares
+            yield page
 
     def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the light of the strong orders."""
-        rows = max(1, _PAIRS // (len(phi) * self._orders.strong))
         parts = [
-            self._strong_part(theta[n : n + rows], phi, grid) for n in range(0, len(theta), rows)
+            self._strong_part(theta[rows], phi, grid)
+            for rows in _blocks(len(theta), len(phi) * self._orders.strong)
         ]
         return lambda s: np.concatenate([part(s) for part in parts])
 
@@ -272,6 +310,12 @@ class Transport:
         shares = (mixture.strong_at(kappa, order) * gain * visible).astype(np.float32)
         to_orders = grid.interpolation(np.arccos(cos_o), azimuth)
         return to_orders.summed_in(np.count_nonzero(pairs, axis=-1), shares)
+
+
+def _blocks(count: int, width: int) -> list[slice]:
+    """Slices of rows of a width: pairs that are looked at together."""
+    rows = max(1, _PAIRS // width)
+    return [slice(first, first + rows) for first in range(0, count, rows)]
 
 
 @dataclass(frozen=True)

@@ -27,3 +27,21 @@ def test_joined_orders_keep_their_places(width: float) -> None:
     found = density.sum(axis=0) * mixture.pitch
     # a bin is moved by 1/(3σ) at most, which puts 0.37 of its lobe elsewhere; a third stay in place
     assert np.abs(found - exact).sum() < 0.1 * exact.sum()
+
+
+@pytest.mark.parametrize("share", [1.0, 2.0])
+@pytest.mark.parametrize("width", [1.0, 7.0])
+def test_the_density_of_a_window_has_all_light_in_few_samples(width: float, share: float) -> None:
+    """However wide the smoothing is beside the lobes, by its share."""
+    field = md.HeightField(np.tile(0.1 * np.arange(50) / 50, (50, 1)), 0.05, periodic=True)
+    table = md.DiffractionTable.build(field, coherence_width=width, coherence="patch")
+    lobe = 1.0 / (np.sqrt(2.0) * table.sigma)
+    mixture = order_mixture(table, 1.0, table.q_limit, share * lobe)
+    assert mixture.beats is not None
+    light = sum(
+        part.astype(np.float64).sum(axis=(1, 2)) for part in (mixture.density, mixture.beats)
+    )
+    # mirrors reflect all light; what the saw's edges send beyond the table's frequencies is missing
+    np.testing.assert_allclose(light * mixture.pitch**2 + mixture.central, 1.0, atol=0.02)
+    # powers are sampled at distances of 0.15/σ, or half of them
+    assert mixture.pitch >= 0.05 * lobe
