@@ -19,6 +19,14 @@ pytestmark = pytest.mark.thorough
 SAMPLES = 16
 
 
+@pytest.fixture(scope="module", autouse=True)
+def few_points() -> Iterator[None]:
+    """Little light between surfaces is traced, the same for the page and the desktop."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 12)
+        yield
+
+
 @pytest.fixture(scope="module")
 def room(scene: Any) -> Any:
     """A disc's tracks and rough metal under a lamp and a sky that is bright on one side."""
@@ -64,7 +72,7 @@ def room(scene: Any) -> Any:
 @pytest.fixture(scope="module")
 def opened(room: Any, browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0))
+        patch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (0.0,))
         page = make_page(room, methods=["fast"])
     assert page.omissions == ()
     path = tmp_path_factory.mktemp("room") / "room.html"
