@@ -191,6 +191,7 @@ def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # of height scales that a page may be asked for, one
     monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (0.0,))
     monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 8)
+    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.surroundings._CELLS", 1 << 16)
     # a process for each `solve` would take longer to start than to solve
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
     monkeypatch.chdir(tree)

@@ -211,13 +211,14 @@ import scipy.interpolate, scipy.ndimage, scipy.spatial
 with contextlib.suppress(ImportError):
     import pandas
 from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.realtime.glsl import bounces
+from mitsuba_diffraction.realtime.glsl import bounces, surroundings
 from tests.support.coarse import coarse_energy
 from tests.support.kernels import compile_quickly
 
 coarse_energy()
 compile_quickly()
 bounces._POINTS = 1 << 8
+surroundings._CELLS = 1 << 16
 
 def run(group, names):
     if process := os.fork():

@@ -20,10 +20,11 @@ SAMPLES = 16
 
 
 @pytest.fixture(scope="module", autouse=True)
-def few_points() -> Iterator[None]:
-    """Little light between surfaces is traced, the same for the page and the desktop."""
+def coarse_surroundings() -> Iterator[None]:
+    """Few paths between surfaces and large cells, the same for the page and the desktop."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 12)
+        patch.setattr("mitsuba_diffraction.realtime.glsl.surroundings._CELLS", 1 << 18)
         yield
 
 
