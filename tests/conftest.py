@@ -186,6 +186,16 @@ def some_variant() -> str:
 
 
 @pytest.fixture
+def spectral() -> None:
+    """The variant llvm_ad_spectral, which commands that measure set by its name, set."""
+    import mitsuba as mi
+
+    if reason := obstacle("llvm_ad_spectral"):
+        pytest.skip(reason)
+    mi.set_variant("llvm_ad_spectral")
+
+
+@pytest.fixture
 def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
     """`run(*arguments)`: main() in this process."""
 

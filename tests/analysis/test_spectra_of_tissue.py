@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -20,18 +19,12 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.optics.materials import TISSUES
 from mitsuba_diffraction.settings import TableSettings
 
+pytestmark = pytest.mark.usefixtures("spectral")
+
 PERIOD, LIGHT, ACCEPTANCE = 1.6, 20.0, 4.0
 LAM = np.array([310.0, 400.0, 420.0, 550.0, 700.0])
 ORDERS = (-2, -1, 0, 1)
 GREY = 0.3
-
-
-@pytest.fixture(autouse=True)
-def variant(working_variant):
-    """The variant of the command, once."""
-    if working_variant != "llvm_ad_spectral":
-        pytest.skip("the variant is set by name")
-    mi.set_variant("llvm_ad_spectral")
 
 
 def sinusoid():

@@ -13,16 +13,10 @@ from PIL import Image
 
 from mitsuba_diffraction.analysis.maps.picture import ATTRIBUTE
 
+pytestmark = pytest.mark.usefixtures("here", "spectral")
+
 # A map of the grating of `heights` that takes half a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "32", "--step", "47"]
-
-
-@pytest.fixture(autouse=True)
-def here(here, working_variant):
-    """The same where the variant works."""
-    if working_variant != "llvm_ad_spectral":
-        pytest.skip("the variant is set by name elsewhere")
-    return here
 
 
 def channels_of(file):

@@ -6,6 +6,7 @@ import itertools
 import os
 import shlex
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -48,8 +49,12 @@ NONE = {"info", "presets"}
 
 
 @pytest.mark.parametrize(("command", "suffixes"), COMMANDS, ids=lambda text: text[:40])
-def test_no_output_of_any_name_replaces_an_input(run, original, world, command, suffixes):
+def test_no_output_of_any_name_replaces_an_input(
+    run, original, world, command, suffixes, monkeypatch
+):
     """Outputs called after each input, with every suffix, in several spellings; then defaults."""
+    # a process for each `solve` would take longer to start than to solve
+    monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
     first, inputs = _inputs(world, command)
     before = {name: (original / name).read_bytes() for name in inputs}
 

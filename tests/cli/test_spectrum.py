@@ -11,16 +11,10 @@ import pytest
 from mitsuba_diffraction.analysis import angular_variables
 from mitsuba_diffraction.heights import gratings
 
+pytestmark = pytest.mark.usefixtures("here", "spectral")
+
 PIXEL = ["--pixel-size", str(1.6 / 64)]
 QUICK = ["--coherence-width", "6", "--wavelength-range", "400:700", "--step", "50"]
-
-
-@pytest.fixture(autouse=True)
-def here(here, working_variant):
-    """The same where the variant works."""
-    if working_variant != "llvm_ad_spectral":
-        pytest.skip("the variant is set by name elsewhere")
-    return here
 
 
 @pytest.fixture

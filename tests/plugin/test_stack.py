@@ -28,13 +28,6 @@ INDICES = np.array([0.3 + 2.5j, 2.3, 1.38, 1.6 + 0.05j])[:, None] * np.ones(3)
 THICK = np.array([60.0, 130.0, 90.0])
 
 
-@pytest.fixture
-def spectral():
-    if reason := obstacle("llvm_ad_spectral"):
-        pytest.skip(reason)
-    mi.set_variant("llvm_ad_spectral")
-
-
 def stack(folder, text):
     (folder / "stack.toml").write_text(text)
     return str(folder / "stack.toml")

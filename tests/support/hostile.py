@@ -203,25 +203,29 @@ def _square() -> TriangleMesh:
     return TriangleMesh(positions, normals, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-# Each group runs in a copy of a process that has only imported the package: what Mitsuba has
-# loaded once, it loads no more.
+# Each group runs in a copy of a process that has only imported the package, and what takes seconds
+# of colour-science's import but Matplotlib: what Mitsuba has loaded once, it loads no more.
 _RUNNER = """
-import json, os, signal, sys
+import contextlib, json, os, signal, sys
+import scipy.interpolate, scipy.ndimage, scipy.spatial
+with contextlib.suppress(ImportError):
+    import pandas
 from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.realtime.glsl import bounces
+from mitsuba_diffraction.realtime.glsl import bounces, surroundings
 from tests.support.coarse import coarse_energy
 from tests.support.kernels import compile_quickly
 
 coarse_energy()
 compile_quickly()
 bounces._POINTS = 1 << 8
+surroundings._CELLS = 1 << 16
 
 def run(group, names):
     if process := os.fork():
         os.waitpid(process, 0)
         return
     for words, name in zip(group, names):
-        signal.alarm(90)
+        signal.alarm(600)  # of a busy machine; a pipe that is read waits for ever
         for descriptor, kind in enumerate(("out", "err"), 1):
             os.dup2(os.open(f"{name}.{kind}", os.O_WRONLY | os.O_CREAT), descriptor)
         try:
@@ -232,8 +236,10 @@ def run(group, names):
         open(f"{name}.code", "w").write(str(code))
     os._exit(0)
 
-for n, group in enumerate(json.load(open(sys.argv[1]))):
-    run(group, [os.path.join(sys.argv[2], f"{n}.{k}") for k in range(len(group))])
+# `solve` starts processes, which import this file
+if __name__ == "__main__":
+    for n, group in enumerate(json.load(open(sys.argv[1]))):
+        run(group, [os.path.join(sys.argv[2], f"{n}.{k}") for k in range(len(group))])
 """
 
 

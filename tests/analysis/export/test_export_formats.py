@@ -20,20 +20,12 @@ from mitsuba_diffraction.columns import read_columns
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.orders import OrderTable
 from tests.support.orders import thin_grating
-from tests.support.variants import obstacle
 
-pytestmark = pytest.mark.thorough
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("spectral")]
 
 #: Window, µm, whose lobes are some 15° wide at half of their height.
 WIDTH = 2.0
 FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
-
-
-@pytest.fixture(autouse=True)
-def variant():
-    if reason := obstacle("llvm_ad_spectral"):
-        pytest.skip(reason)
-    mi.set_variant("llvm_ad_spectral")
 
 
 def grating(**more):

@@ -56,13 +56,12 @@ def test_the_first_resolution_of_an_echelle_carries_the_waves_along_its_facets()
     assert abs(orders[shares.argmax()] + 2.0 * sine * period / 0.55) <= 1.0
 
 
-@pytest.mark.parametrize(("period", "waves"), [(50.0, 61), (100.0, 1)])
-def test_one_direction_of_a_long_period_is_a_small_table(period, waves):
-    """Aluminium, 0.1 µm deep: its reflectance in all orders, in a megabyte at most."""
+def test_one_direction_of_a_long_period_is_a_small_table():
+    """Aluminium, 0.1 µm deep: its reflectance in all orders, a megabyte at most for 61 waves."""
     settings = Settings(wavelengths=(550.0, 550.0), tolerance=0.02)
     with pytest.warns(md.DiffractionWarning, match="nearest direction"):
-        table = solve_orders(sinusoidal(period, 0.1), "Al", theta=20.0, settings=settings)
-    assert waves * table.nbytes < 1e6
+        table = solve_orders(sinusoidal(100.0, 0.1), "Al", theta=20.0, settings=settings)
+    assert 61 * table.nbytes < 1e6
     shares = table.efficiency(-np.sin(np.radians(20.0)), 0.0, 550.0, table.response.orders[:, 0])
     assert shares.sum() == pytest.approx(0.915, abs=0.01)
 

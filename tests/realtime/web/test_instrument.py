@@ -22,24 +22,6 @@ SIZE = (240, 180)
 PHONE = (390, 844)
 
 
-@pytest.fixture(scope="module")
-def one(browser: Any, page_file: Path) -> Iterator[Tab]:
-    """One page for the whole file; `opened` sets it back."""
-    tab = Tab(browser, SIZE)
-    assert tab.open(page_file) == "ready", tab.page.inner_text("#message")
-    yield tab
-    tab.page.close()
-
-
-@pytest.fixture
-def opened(one: Tab) -> Iterator[Tab]:
-    one.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
-    one.page.evaluate("document.body.classList.add('folded')")
-    one.page.evaluate("viewer.most = 1; viewer.controls.reset(); viewer.settled(0)")
-    yield one
-    assert one.said == []
-
-
 @contextmanager
 def clock_stopped(page: Any) -> Iterator[None]:
     """For a page, what moves goes on moving, however long the machine takes."""

@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.realtime.web import Viewer
 from mitsuba_diffraction.realtime.web.export import MAX_BYTES, Page, make_page
+from tests.support.browser import Tab
 from tests.support.pictures import picture
 
 pytestmark = pytest.mark.thorough
 
+SIZE = (240, 180)
 
-def test_colours_move_with_the_light_and_come_back(page_file: Path, tab: Any) -> None:
-    opened = tab((240, 180))
-    assert opened.open(page_file) == "ready"
-    opened.page.evaluate("document.body.classList.add('folded')")
 
+def test_colours_move_with_the_light_and_come_back(opened: Tab) -> None:
     def chromaticities() -> NDArray[np.float64]:
         image = picture(opened)[..., :3].astype(float)
         return image / np.maximum(image.sum(axis=-1, keepdims=True), 1e-6)
@@ -40,13 +39,9 @@ def test_colours_move_with_the_light_and_come_back(page_file: Path, tab: Any) ->
     assert np.median(changed) < 0.02
     opened.page.keyboard.press("r")
     np.testing.assert_allclose(chromaticities(), first, atol=1e-3)
-    assert opened.said == []
 
 
-def test_the_mouse_turns_moves_and_zooms(page_file: Path, tab: Any) -> None:
-    opened = tab((240, 180))
-    assert opened.open(page_file) == "ready"
-    opened.page.evaluate("document.body.classList.add('folded')")
+def test_the_mouse_turns_moves_and_zooms(opened: Tab) -> None:
     mouse, keyboard = opened.page.mouse, opened.page.keyboard
 
     def camera() -> dict[str, Any]:
@@ -76,12 +71,9 @@ def test_the_mouse_turns_moves_and_zooms(page_file: Path, tab: Any) -> None:
     assert not np.allclose(panned["target"], start["target"], atol=0.1)
     mouse.wheel(0, -100)
     opened.page.wait_for_function(f"viewer.camera.distance < {0.95 * distance}")
-    assert opened.said == []
 
 
-def test_sliders_change_the_picture(page_file: Path, tab: Any) -> None:
-    opened = tab()
-    assert opened.open(page_file) == "ready"
+def test_sliders_change_the_picture(opened: Tab) -> None:
     before = picture(opened)[..., :3]
     opened.page.evaluate(
         "element('heights').value = -1, element('heights').dispatchEvent(new Event('input'))"
@@ -170,7 +162,7 @@ def test_what_does_not_fit_is_left_out_from_the_last_on(
     monkeypatch.setattr(packing, "CODE_BYTES", MAX_BYTES - 1000)
     monkeypatch.setattr(packing, "OCTAVES", (0.0,))
     with pytest.raises(DiffractionError, match=r"is too large for a page \(exact: .*; fast: "):
-        make_page(scene)
+        make_page(scene, bounces=False)
 
 
 @pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
-from tests.support.browser import load_scene
+from tests.support.browser import SIZE, Tab, load_scene  # noqa: F401 - the page's size
 from tests.support.pictures import picture
 
 pytestmark = pytest.mark.thorough
@@ -40,13 +39,11 @@ GOLD: dict[str, Any] = {
     ],
 )
 def test_a_control_draws_what_the_parameter_does(
-    page_file: Path, tab: Any, control: str, value: str, surface: Any, method: str, bound: float
+    opened: Tab, control: str, value: str, surface: Any, method: str, bound: float
 ) -> None:
     pytest.importorskip("moderngl")
     from mitsuba_diffraction.realtime.glsl import Renderer
 
-    opened = tab()
-    assert opened.open(page_file) == "ready", opened.page.inner_text("#message")
     before = picture(opened)
     opened.page.evaluate(CHOOSE, [control, value])
     assert opened.page.evaluate("viewer.drawn") == method
@@ -66,4 +63,3 @@ def test_a_control_draws_what_the_parameter_does(
     opened.page.keyboard.press("r")
     opened.page.wait_for_function("viewer.material === null && viewer.coherence === 1")
     np.testing.assert_allclose(picture(opened), before, atol=1e-6)
-    assert opened.said == []

@@ -19,6 +19,15 @@ pytestmark = pytest.mark.thorough
 SAMPLES = 16
 
 
+@pytest.fixture(scope="module", autouse=True)
+def coarse_surroundings() -> Iterator[None]:
+    """Few paths between surfaces and large cells, the same for the page and the desktop."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 12)
+        patch.setattr("mitsuba_diffraction.realtime.glsl.surroundings._CELLS", 1 << 18)
+        yield
+
+
 @pytest.fixture(scope="module")
 def room(scene: Any) -> Any:
     """A disc's tracks and rough metal under a lamp and a sky that is bright on one side."""
@@ -64,7 +73,7 @@ def room(scene: Any) -> Any:
 @pytest.fixture(scope="module")
 def opened(room: Any, browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0))
+        patch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (0.0,))
         page = make_page(room, methods=["fast"])
     assert page.omissions == ()
     path = tmp_path_factory.mktemp("room") / "room.html"
