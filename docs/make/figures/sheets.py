@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from docs.make.validation.light import direction, heights_of, light_on
+from docs.make.validation.cases import direction
+from docs.make.validation.light import heights_of, light_on
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders.solve.grating_index import material_of

@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.validation.cases import in_plane
 from docs.make.validation.light import heights_of, light_of, powers_of
-from docs.make.validation.model import efficiencies, in_plane
+from docs.make.validation.model import efficiencies
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon

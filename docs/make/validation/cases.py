@@ -1,4 +1,4 @@
-"""Gratings, lights and materials for which the model is compared with rigorous solutions.
+"""Cases for which the model is compared with rigorous solutions: a surface, its light and media.
 
 Angles are those of the light's direction in the plane of the grooves' normal, positive towards +x;
 order m leaves at sinθo = mλ/d − sinθi, positive towards +x too. Blazed gratings ascend towards +x:
@@ -9,13 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
 
+Real = NDArray[np.float64]
+
+#: Folder of the stored solutions.
+DATA = Path(__file__).parent / "data"
 PROFILES = ("sinusoidal", "lamellar", "blazed")
 MATERIALS = ("perfect", "aluminium", "keratin")
 
@@ -39,8 +47,9 @@ ALUMINIUM = {460.0: 0.646 + 5.590j, 610.0: 1.248 + 7.368j}
 #: Silicon's index by wavelength (nm): Mitsuba's own table (material `Si`), interpolated.
 SILICON = {460.0: 4.577 + 0.130j, 610.0: 3.906 + 0.022j}
 
-#: Keratin's index, the middle of what is reported for hair and scales (1.54–1.58).
-KERATIN = 1.56
+#: Indices of dielectrics; keratin's is the middle of what is reported for hair and scales
+#: (1.54–1.58).
+DIELECTRICS = {"keratin": 1.56, "glass": 1.5}
 
 _METALS = {"aluminium": ALUMINIUM, "silicon": SILICON}
 
@@ -49,6 +58,15 @@ COAT = 1.58
 
 #: Samples a period: 5e-6 from the closed forms of lamellar and blazed gratings.
 PIXELS = 512
+
+
+class Surface(Protocol):
+    """Surface of a case: a `Grating`, or a cell of `patches`; its text is its name in files."""
+
+    @property
+    def field(self) -> HeightField:
+        """Heights of one period."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -76,22 +94,131 @@ class Grating:
             self.period, self.depth, periods=1, pixels_per_period=pixels, rows=2, **ascends
         )
 
+    @cached_property
+    def field(self) -> HeightField:
+        """Heights with `PIXELS` samples."""
+        return self.heights()
+
     def __str__(self) -> str:
         return f"{self.profile} {self.period:g}/{self.depth:g} µm"
 
 
-@dataclass(frozen=True)
-class Scan:
-    """Grating in light from one direction (θi in degrees), at several wavelengths (nm)."""
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Any heights."""
 
-    grating: Grating
-    material: str
+    field: HeightField
+
+
+class Light(NamedTuple):
+    """Light of one wavelength (nm) from a direction (degrees); phi is from across the grooves."""
+
+    wavelength: float
     theta: float
-    wavelengths: tuple[float, ...]
+    phi: float = 0.0
 
 
-def scans(material: str) -> list[Scan]:
-    """All scans of one material, in a fixed order.
+@dataclass(frozen=True)
+class Media:
+    """Material beneath a surface, and what lies over it.
+
+    Attributes
+    ----------
+    material : of `index_of`.
+    film : index and thickness (nm) of a film over the surface.
+    coat : index of a clear coat; `once` leaves out the light that its face sends back.
+    through : whether the orders are those that go through.
+    """
+
+    material: str
+    film: tuple[complex, float] | None = None
+    coat: float | None = None
+    once: bool = False
+    through: bool = False
+
+    @property
+    def layer(self) -> dict[str, Any]:
+        """Arguments of `reference.brdf` for film or coat."""
+        return {name: v for name in ("film", "coat") if (v := getattr(self, name)) is not None}
+
+    @property
+    def text(self) -> str:
+        """Media in words, for files of solutions."""
+        film = f", film of {self.film[0]:g}, {self.film[1]:g} nm" if self.film else ""
+        coat = f" under a coat of index {self.coat:g}" if self.coat else ""
+        return f"{self.material}{film}{coat}{', single' if self.once else ''}"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A surface in a light."""
+
+    surface: Surface
+    light: Light
+    media: Media
+
+    @cached_property
+    def wi(self) -> Real:
+        """Unit vector to the light, (3,)."""
+        return direction(self.light.theta, self.light.phi)
+
+    @property
+    def index(self) -> complex | None:
+        """Index n + ik of the material; none of a perfect conductor."""
+        perfect = self.media.material == "perfect"
+        return None if perfect else index_of(self.media.material, self.light.wavelength)
+
+    @cached_property
+    def orders(self) -> NDArray[np.int64]:
+        """Reflected orders across the grooves (n, 2), in light across them."""
+        orders, _ = order_sines(self.field.extent[0], self.light.wavelength, self.light.theta)
+        return np.stack([orders, np.zeros_like(orders)], axis=1)
+
+    @property
+    def field(self) -> HeightField:
+        """Heights of one period."""
+        return self.surface.field
+
+    def wo(self, order: NDArray[np.int64]) -> Real:
+        """Directions (n, 3) of orders (n, 2), below the surface if they go through."""
+        step = self.light.wavelength / 1000 / np.array(self.field.extent)
+        tangential = order * step - self.wi[:2]
+        if self.media.through:
+            assert self.index is not None
+            tangential /= self.index.real
+        up = np.sqrt(np.maximum(1 - np.sum(tangential**2, axis=1), 0))
+        return np.column_stack([tangential, -up if self.media.through else up])
+
+    def has(self, **values: Any) -> bool:
+        """Whether surface, light and media have these values, such as theta=30.0."""
+        own = self._values
+        return all(name in own and own[name] == value for name, value in values.items())
+
+    @cached_property
+    def _values(self) -> dict[str, Any]:
+        surface, media = self.surface, self.media
+        return (
+            {"surface": surface, "grating": surface, "media": media}
+            | {**vars(surface), **vars(media)}
+            | self.light._asdict()
+        )
+
+
+def direction(theta: float, phi: float = 0.0) -> Real:
+    """Return the unit vector (3,) of angles in degrees."""
+    polar, turn = np.radians([theta, phi])
+    sine = np.sin(polar)
+    return np.array([sine * np.cos(turn), sine * np.sin(turn), np.cos(polar)])
+
+
+def in_plane(sine: ArrayLike) -> Real:
+    """Unit vectors (..., 3) in the x–z plane with this x component."""
+    x = np.asarray(sine, np.float64)
+    return np.stack([x, np.zeros_like(x), np.sqrt(np.maximum(1 - x * x, 0))], axis=-1)
+
+
+def grating_cases(material: str) -> list[Case]:
+    """All gratings and lights of one material, in a fixed order.
 
     Raises
     ------
@@ -102,7 +229,7 @@ def scans(material: str) -> list[Scan]:
         raise DiffractionError(
             f"material '{material}' is unknown; choose one of {', '.join(MATERIALS)}"
         )
-    return list(_scans(material))
+    return list(_cases(material))
 
 
 def index_of(material: str, wavelength: float) -> complex:
@@ -112,8 +239,8 @@ def index_of(material: str, wavelength: float) -> complex:
     """
     if material == "aluminium under polycarbonate":
         return index_of("aluminium", wavelength * COAT) / COAT
-    if material == "keratin":
-        return complex(KERATIN)
+    if material in DIELECTRICS:
+        return complex(DIELECTRICS[material])
     nodes = _METALS[material]  # Mitsuba's tables are smooth between them
     return complex(np.interp(wavelength, list(nodes), list(nodes.values())))
 
@@ -121,11 +248,11 @@ def index_of(material: str, wavelength: float) -> complex:
 def index_text(material: str) -> str:
     """Return the index of a material in words, for files of solutions."""
     if material not in _METALS:
-        return f"{KERATIN:g}" if material == "keratin" else "perfect conductor"
+        return f"{DIELECTRICS[material]:g}" if material in DIELECTRICS else "perfect conductor"
     return ", ".join(f"{n:g} at {w:g} nm" for w, n in _METALS[material].items())
 
 
-def _scans(material: str) -> Iterator[Scan]:
+def _cases(material: str) -> Iterator[Case]:
     for profile in PROFILES:
         for period in PERIODS:
             for depth in DEPTHS:
@@ -133,7 +260,8 @@ def _scans(material: str) -> Iterator[Scan]:
                 if not _affordable(grating, material):
                     continue
                 for theta in _angles(profile, material):
-                    yield Scan(grating, material, theta, _wavelengths(grating, material, theta))
+                    for wavelength in _wavelengths(grating, material, theta):
+                        yield Case(grating, Light(wavelength, theta), Media(material))
 
 
 def _affordable(grating: Grating, material: str) -> bool:

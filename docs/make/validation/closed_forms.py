@@ -13,8 +13,8 @@ from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, kirchhoff_fact
 from mitsuba_diffraction.tables.lookup import window_sum
 from mitsuba_diffraction.tables.table import DiffractionTable
 
-from .cases import WAVELENGTHS, Grating, order_sines
-from .model import LOBE_SIGMA, in_plane
+from .cases import WAVELENGTHS, Grating, in_plane, order_sines
+from .model import LOBE_SIGMA
 
 #: Angles of incidence, and the largest angle of an order, degrees.
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)

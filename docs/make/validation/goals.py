@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cases import PROFILES, Grating
-from .cells import PatchComparison, chosen
-from .compare import Comparison, angles_of, compare, gratings_of
-from .models import ANGLES, BANDS, banded, of_colours, within
+from .compare import Comparison, Sides, angles_of, compare, gratings_of
+from .models import ANGLES, BANDS, banded, of_cells, of_colours, within
+from .solutions import Solutions
 
 #: Largest deviation of colours on keratin at 60°, by profile and band of depth/period.
 KERATIN = {
@@ -23,9 +23,6 @@ KERATIN = {
     ("blazed", BANDS[0]): 0.09,
     ("blazed", BANDS[1]): 0.18,
 }
-
-#: A comparison for each (material, model).
-Sides = Mapping[tuple[str, str], Comparison]
 
 # Enough for a hundredth of a point
 _SHARES = np.linspace(0.0, 1.0, 101)
@@ -61,10 +58,7 @@ class Case:
     def with_one_share(self) -> tuple[float, float]:
         """Share of small slope, equal for all orders, with the least deviation, which is second."""
         by_share = [
-            [
-                of_colours(replace(by_model["kirchhoff"], model=model))
-                for model in _by_share(by_model)
-            ]
+            [by_model["kirchhoff"].colours_of(model) for model in _by_share(by_model)]
             for by_model in self.gratings
         ]
         mean = np.mean(by_share, axis=0)
@@ -77,7 +71,7 @@ class Case:
             models, exact = _by_share(by_model), by_model["kirchhoff"].rigorous
             nearest = np.abs(models - exact).argmin(axis=0)
             best = models[nearest, np.arange(len(exact))]
-            deviations.append(of_colours(replace(by_model["kirchhoff"], model=best)))
+            deviations.append(by_model["kirchhoff"].colours_of(best))
         return float(np.mean(deviations))
 
 
@@ -124,10 +118,9 @@ class Cuts(NamedTuple):
     worst: float
 
 
-def cuts_of_scales(cells: Sequence[PatchComparison], model: str) -> Cuts | None:
+def cuts_of_scales(cells: Sides, model: str) -> Cuts | None:
     """Deviation on cuts of scales of keratin with slope 0.2; None where none are stored."""
-    scales = chosen(cells, ("elaphe", "elaphe_like"), 0.2, "keratin")
-    deviations = [c.by_model[model] for c in scales]
+    deviations = of_cells(cells["keratin", model], kinds=("elaphe", "elaphe_like"), slope=0.2)
     return Cuts(float(np.mean(deviations)), max(deviations)) if deviations else None
 
 
@@ -146,7 +139,7 @@ def much_worse(sides: Sides, material: str) -> list[Case]:
 def with_half(sides: Sides, material: str) -> dict[str, Comparison]:
     """Comparisons of one material by model, and by equal parts of both matrices."""
     models = models_of(sides, material)
-    half = compare(material, models["kirchhoff"].solutions, "half_and_half")
+    half = compare(Solutions(models["kirchhoff"].solved), "half_and_half")
     return {**models, "half_and_half": half}
 
 

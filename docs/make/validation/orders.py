@@ -25,11 +25,10 @@ from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.orders.solve.stations import Grating, Solver
 
+from .cases import Real
 from .compare import GRAZING, misplaced
-from .light import Light, heights_of, light_of, light_on, powers_of
-from .model import LOBE_SIGMA, efficiencies
-
-Real = NDArray[np.float64]
+from .light import Beam, heights_of, light_of, light_on, powers_of
+from .model import efficiencies
 
 FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 #: Tables, and (θ, φ) of the light in degrees: across the grooves, oblique and along them.
@@ -185,7 +184,7 @@ class Case:
         x = order * inside / 1e3 / table.period - wi[0]
         wo = np.stack([x, np.full(len(x), -wi[1]), np.sqrt(1 - x**2 - wi[1] ** 2)], axis=-1)
         index = self._index(wavelength)
-        model = efficiencies(self.field, index, wi, wo, inside, "small_slope", sigma=LOBE_SIGMA)
+        model = efficiencies(self.field, index, wi, wo, inside, "small_slope")
         solved = table.efficiency(-wi[0], wi[1], wavelength, order)
         return Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
 
@@ -217,6 +216,6 @@ class Case:
         return _unpolarised(self.solver, light)
 
 
-def _unpolarised(solver: Solver, light: Light) -> dict[int, float]:
+def _unpolarised(solver: Solver, light: Beam) -> dict[int, float]:
     """Return the efficiencies of all orders."""
     return {m: float(power.mean()) for m, power in powers_of(solver, light).items()}

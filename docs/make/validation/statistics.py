@@ -12,7 +12,7 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.heights.spectra import order_powers
 from mitsuba_diffraction.optics.geometry import wavenumber
 
-from .model import in_plane
+from .cases import in_plane
 from .roughness import Estimate, Roughness, estimate, mean_brdf, mean_order_0, shifted
 
 _CORRELATION = 1.0  # µm

@@ -6,19 +6,18 @@ import numpy as np
 import pytest
 
 from docs.make.validation import goals
-from docs.make.validation.cases import Grating, index_of, order_sines
-from docs.make.validation.compare import compare
-from docs.make.validation.model import in_plane, order_efficiencies
+from docs.make.validation.cases import Grating, index_of
+from docs.make.validation.compare import Sides, compare
 from docs.make.validation.models import compare_all
-from docs.make.validation.solutions import shipped
+from docs.make.validation.solutions import Solutions, shipped
 from mitsuba_diffraction.reference import boundary, model
 
 pytestmark = pytest.mark.thorough
 
 
 @pytest.fixture(scope="module")
-def sides() -> goals.Sides:
-    return compare_all({name: compare(name) for name in ("keratin", "aluminium")})
+def sides() -> Sides:
+    return compare_all({name: shipped(name) for name in ("keratin", "aluminium")})
 
 
 @pytest.fixture(scope="module")
@@ -49,19 +48,17 @@ def test_on_aluminium_few_gratings_are_worse_and_by_little(cases):
 
 
 def test_shares_lie_between_the_two_matrices():
-    grating, theta, wavelength = Grating("blazed", 1.1, 0.1), 30.0, 460.0
-    chosen = shipped("aluminium").where(
-        profile="blazed", period=1.1, depth=0.1, theta=theta, wavelength=wavelength
+    (solved,) = (
+        shipped("aluminium")
+        .where(grating=Grating("blazed", 1.1, 0.1), theta=30.0, wavelength=460.0)
+        .solved
     )
     models = {
-        name: compare("aluminium", chosen, name)
+        name: compare(Solutions([solved]), name)
         for name in ("kirchhoff", "half_and_half", "small_slope_alone")
     }
-    index = index_of("aluminium", wavelength)
-    _, sines = order_sines(grating.period, wavelength, theta)
-    lit = in_plane(np.sin(np.radians(theta))), in_plane(sines), index
-    direct = order_efficiencies(grating, "aluminium", theta, wavelength)
-    direct *= boundary.unpolarised(model.blended(*lit, 0.25))
+    lit = solved.case.wi, solved.wo, index_of("aluminium", 460.0)
+    direct = models["kirchhoff"].model * boundary.unpolarised(model.blended(*lit, 0.25))
     direct /= boundary.unpolarised(model.kirchhoff(*lit))
     assert goals._by_share(models)[25] == pytest.approx(direct, rel=1e-9)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from docs.make.validation import statistics
-from docs.make.validation.model import in_plane
+from docs.make.validation.cases import in_plane
 from docs.make.validation.roughness import Roughness, mean_brdf, mean_order_0
 from mitsuba_diffraction import HeightField, reference
 

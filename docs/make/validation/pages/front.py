@@ -6,10 +6,9 @@ import numpy as np
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
-from ..cells import chosen
 from ..compare import GRAZING, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope
-from ..models import ANGLES, of_colours
+from ..models import ANGLES, of_cells, of_colours
 from .markdown import percent, table
 from .measurements import Measurements
 
@@ -102,19 +101,18 @@ def _gratings(measured: Measurements) -> list[list[object]]:
 def _cells(measured: Measurements) -> list[list[object]]:
     rows = []
     for name, kinds, slope, material in _CELLS:
-        same = chosen(measured.cells, kinds, slope, material)
-        oblique = [c.by_model for c in same if c.case.theta == 60.0]
-        if not oblique:
+        kirchhoff, *default = (
+            of_cells(measured.cells[material, model], kinds=kinds, slope=slope, theta=theta)
+            for model, theta in (
+                ("kirchhoff", 60.0),
+                *(("small_slope", a) for a in (60.0, 0.0, 30.0)),
+            )
+        )
+        if not kirchhoff:
             continue
-        columns = [
-            _mean_and_worst(np.array([by_model[model] for by_model in oblique]))
-            for model in ("kirchhoff", "small_slope")
-        ]
-        steeper = [
-            [c.by_model["small_slope"] for c in same if c.case.theta == a] for a in (0.0, 30.0)
-        ]
-        means = [percent(float(np.mean(values))) if values else "–" for values in steeper]
-        rows.append([name, len(oblique), *columns, *means])
+        columns = [_mean_and_worst(np.array(values)) for values in (kirchhoff, default[0])]
+        means = [percent(float(np.mean(values))) if values else "–" for values in default[1:]]
+        rows.append([name, len(kirchhoff), *columns, *means])
     return rows
 
 
