@@ -6,20 +6,18 @@ Each function takes wavelengths in nm and returns efficiencies of the same shape
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from docs.make.validation.cases import in_plane
 from docs.make.validation.light import heights_of, light_of, powers_of
 from docs.make.validation.model import efficiencies
 from mitsuba_diffraction import reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile
 from mitsuba_diffraction.orders.solve.stations import Solver, Station
-
-Real = NDArray[np.float64]
 
 # y of light in the plane across the grooves; at 0 exactly the two polarisations are the same
 _ALONG = 0.0

@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from mitsuba_diffraction.arrays import Real, Whole
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-
-Real = NDArray[np.float64]
 
 #: Folder of the stored solutions.
 DATA = Path(__file__).parent / "data"
@@ -169,7 +168,7 @@ class Case:
         return None if perfect else index_of(self.media.material, self.light.wavelength)
 
     @cached_property
-    def orders(self) -> NDArray[np.int64]:
+    def orders(self) -> Whole:
         """Reflected orders across the grooves (n, 2), in light across them."""
         orders, _ = order_sines(self.field.extent[0], self.light.wavelength, self.light.theta)
         return np.stack([orders, np.zeros_like(orders)], axis=1)
@@ -179,7 +178,7 @@ class Case:
         """Heights of one period."""
         return self.surface.field
 
-    def wo(self, order: NDArray[np.int64]) -> Real:
+    def wo(self, order: Whole) -> Real:
         """Directions (n, 3) of orders (n, 2), below the surface if they go through."""
         step = self.light.wavelength / 1000 / np.array(self.field.extent)
         tangential = order * step - self.wi[:2]

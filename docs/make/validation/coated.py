@@ -20,10 +20,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Real, Whole
 from mitsuba_diffraction.reference.fresnel import amplitudes
 
 from . import integral, rayleigh
-from .cases import COAT, Case, Grating, Light, Media, Real
+from .cases import COAT, Case, Grating, Light, Media
 from .compare import compare
 from .models import ANGLES
 from .solutions import Orders, Solutions, stored
@@ -77,7 +78,7 @@ def solve(case: Case, fine: int) -> Orders:
 
 
 def leaving(
-    matrix: Real, face: Real, outside: NDArray[np.bool_], orders: NDArray[np.int64], *, once: bool
+    matrix: Real, face: Real, outside: NDArray[np.bool_], orders: Whole, *, once: bool
 ) -> Real:
     """Efficiencies of the orders that leave the coat, from E (inner, inner) and R of the face.
 
@@ -93,7 +94,7 @@ def leaving(
     return np.asarray(out)
 
 
-def inner_orders(period: float, wavelength: float, theta: float) -> NDArray[np.int64]:
+def inner_orders(period: float, wavelength: float, theta: float) -> Whole:
     """Orders that propagate inside the coat."""
     step, sine = wavelength / 1000 / period, np.sin(np.radians(theta))
     return np.arange(np.ceil((sine - COAT) / step), np.floor((sine + COAT) / step) + 1).astype(int)

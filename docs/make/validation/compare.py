@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .cases import Grating, Real
+from mitsuba_diffraction.arrays import Real, Whole
+
+from .cases import Grating
 from .model import modelled
 from .solutions import LIGHTS, Solutions, Solved
 
@@ -26,7 +28,7 @@ class Comparison:
     others: Sequence[Real]
 
     @cached_property
-    def order(self) -> NDArray[np.int64]:
+    def order(self) -> Whole:
         """Orders of all cases, (n, 2)."""
         return Solutions(self.solved).column("order")
 
@@ -115,8 +117,8 @@ Sides = Mapping[tuple[str, str], Comparison]
 
 
 def misplaced(
-    values: NDArray[np.float64],
-    exact: NDArray[np.float64],
+    values: Real,
+    exact: Real,
     keep: NDArray[np.bool_] | slice = slice(None),
 ) -> float:
     """Return Σ|values − exact| / Σ exact over the rows that are kept; NaN without light in them."""
@@ -154,7 +156,7 @@ def table_of(
     gratings: Sequence[Grating],
     angles: Sequence[float],
     measure: Callable[[Comparison], float],
-) -> NDArray[np.float64]:
+) -> Real:
     """A measure for each grating and angle, (gratings, angles); NaN where nothing was solved."""
     result = np.full((len(gratings), len(angles)), np.nan)
     for row, grating in enumerate(gratings):

@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.reference import boundary
 
 from .cases import Case
@@ -74,12 +74,12 @@ _TURNED = np.array([1.0, -1.0, -1.0])
 
 
 def lowest_orders(
-    along: NDArray[np.float64],
+    along: Real,
     lam: float,
     extent: tuple[float, float],
     crossed: bool,
     count: int,
-) -> NDArray[np.int64]:
+) -> Whole:
     """Order numbers (count, 2) of the lowest spatial frequencies of the field, light's included."""
     reach = np.arange(-count, count + 1) if not crossed else np.arange(-40, 41)
     mx, my = np.meshgrid(reach, reach if crossed else [0], indexing="ij")
@@ -104,7 +104,7 @@ def _stack(cell: Any, field: HeightField, epsilon: complex, layers: int) -> None
     cell.GridLayer_geteps([mean, mean, 1 / (1 - filled + filled / epsilon)])
 
 
-def _amplitudes(cell: Any, orders: NDArray[np.int64], case: Case, top: float) -> Orders:
+def _amplitudes(cell: Any, orders: Whole, case: Case, top: float) -> Orders:
     """Reflected fields of light polarised along s and p, from the stack's scattering matrix."""
     from grcwa.rcwa import GetSMatrix
 
@@ -140,9 +140,7 @@ def _amplitudes(cell: Any, orders: NDArray[np.int64], case: Case, top: float) ->
     return Orders.of_amplitudes(case, order, phase[:, None, None] * turned)
 
 
-def _eigenmodes(
-    omega: Any, kx: Any, ky: Any, kp: Any, epsilon: Any
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _eigenmodes(omega: Any, kx: Any, ky: Any, kp: Any, epsilon: Any) -> tuple[Complex, Complex]:
     """Modes of a layer; grcwa's own takes a travelling mode whose Im q is −1e-17 for a returning
     one, which makes its scattering matrices singular."""
     k = np.vstack((np.diag(kx), np.diag(ky)))

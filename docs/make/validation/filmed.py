@@ -16,17 +16,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Complex, Real
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.reference.fresnel import decaying_root
 
-from .cases import FEW_WAVELENGTHS, Case, Grating, Light, Media, Real
+from .cases import FEW_WAVELENGTHS, Case, Grating, Light, Media
 from .compare import compare, table_of
 from .models import ANGLES, of_colours
 from .solutions import Orders, Solutions, Solved, stored
-
-Complex = NDArray[np.complex128]
 
 #: Films on materials, by name.
 FILMS = {

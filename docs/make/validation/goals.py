@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mitsuba_diffraction.arrays import Real
 
 from .cases import PROFILES, Grating
 from .compare import Comparison, Sides, angles_of, compare, gratings_of
@@ -75,7 +76,7 @@ class Case:
         return float(np.mean(deviations))
 
 
-def _by_share(models: Mapping[str, Comparison]) -> NDArray[np.float64]:
+def _by_share(models: Mapping[str, Comparison]) -> Real:
     """Efficiencies (shares, n) by `_SHARES` of small slope in every order.
 
     They are quadratic in the share s, and so given by those at s = 0, 1/2 and 1.

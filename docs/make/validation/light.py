@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve.profiles import Profile
 from mitsuba_diffraction.orders.solve.stations import Grating, Solver, Station
 
-from .cases import PIXELS, Real
+from .cases import PIXELS
 
 
 class Beam(NamedTuple):

@@ -18,9 +18,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.optics import blend
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.reference import boundary
@@ -40,14 +40,14 @@ MODELS = (*reference.MODELS, "small_slope_alone", "half_and_half")
 def efficiencies(
     field: HeightField,
     index: complex | None,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
+    wi: Real,
+    wo: Real,
     wavelength: float,
     model: str,
     *,
     sigma: float = LOBE_SIGMA,
     **layer: Any,
-) -> NDArray[np.float64]:
+) -> Real:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
     Parameters
@@ -80,11 +80,11 @@ def efficiencies(
 def jones_of(
     field: HeightField,
     index: complex,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
+    wi: Real,
+    wo: Real,
     wavelength: float,
     model: str,
-) -> NDArray[np.complex128]:
+) -> Complex:
     """Jones matrices (n, 2, 2) of one of `MODELS`; arguments as `efficiencies`."""
     if model == "kirchhoff":
         return models.kirchhoff(wi, wo, index)
@@ -98,10 +98,10 @@ def jones_of(
 def share_of(
     field: HeightField,
     index: complex,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
+    wi: Real,
+    wo: Real,
     wavelength: float,
-) -> NDArray[np.float64]:
+) -> Real:
     """s of small slope in the default, (n,); arguments as `efficiencies`."""
     k, total = float(wavenumber(wavelength)), wi + wo
     roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
@@ -109,13 +109,13 @@ def share_of(
     return np.asarray(models.small_slope_weight(k * total[:, 2], variance, index))
 
 
-def shares(jones: NDArray[np.complex128]) -> NDArray[np.float64]:
+def shares(jones: Complex) -> Real:
     """Power of incident s and p light after Jones matrices, over the mean of both, (n, 2)."""
     power = np.sum(np.abs(jones) ** 2, axis=1)
     return np.asarray(power / power.mean(axis=1, keepdims=True), np.float64)
 
 
-def modelled(case: Case, order: NDArray[np.int64], model: str) -> NDArray[np.float64]:
+def modelled(case: Case, order: Whole, model: str) -> Real:
     """Efficiencies (n, 2) of orders (n, 2) of a case, for s and p light.
 
     Both are the mean for unpolarised light of a perfect conductor, under layers, and of light that
@@ -144,9 +144,7 @@ def modelled(case: Case, order: NDArray[np.int64], model: str) -> NDArray[np.flo
     return mean[:, None] * shares(jones_of(case.field, index, *light[2:]))
 
 
-def _diffracted_once(
-    case: Case, wi: NDArray[np.float64], wo: NDArray[np.float64], model: str
-) -> NDArray[np.float64]:
+def _diffracted_once(case: Case, wi: Real, wo: Real, model: str) -> Real:
     """Efficiencies of what is diffracted once under a coat, without what its face reflects."""
     coat, wavelength = case.media.coat, case.light.wavelength
     assert coat is not None

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import OrderTable
+from mitsuba_diffraction.arrays import Real, Whole
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
@@ -25,7 +26,6 @@ from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.orders.solve.stations import Grating, Solver
 
-from .cases import Real
 from .compare import GRAZING, misplaced
 from .light import Beam, heights_of, light_of, light_on, powers_of
 from .model import efficiencies
@@ -58,7 +58,7 @@ class Deviation(NamedTuple):
 class Row(NamedTuple):
     """Efficiencies at one wavelength, (n,) each: orders, cosines, truth, model and table."""
 
-    order: NDArray[np.int64]
+    order: Whole
     cosine: Real
     truth: Real
     model: Real

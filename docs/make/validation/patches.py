@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from docs.make.figures.pages import option, program
 from mitsuba_diffraction import HeightField, gratings
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.atomic import atomic_path
 
 from .cases import DATA, Case, Light, Media
@@ -67,7 +67,7 @@ class Cell:
 class Cut(NamedTuple):
     """Heights of a cut and its side, both in µm."""
 
-    heights: NDArray[np.float64]
+    heights: Real
     side: float
 
 
@@ -188,7 +188,7 @@ def _periodic(field: HeightField) -> HeightField:
     return HeightField(h - np.fft.ifft2(spectrum).real, field.pixel_size, name=field.name)
 
 
-def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:
+def _smoothed(heights: Real, side: float) -> Real:
     """Low frequencies at `PIXELS` samples a side, weighed by the Gaussian `_SMOOTHING`."""
     count = len(heights)
     harmonics = min(count, PIXELS) // 2 - 1  # harmonics either way, without Nyquist's
@@ -200,7 +200,7 @@ def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:
     return np.fft.ifft2(spectrum).real
 
 
-def _slope(heights: NDArray[np.float64], side: float) -> float:
+def _slope(heights: Real, side: float) -> float:
     """RMS of |∇h| of the band-limited surface."""
     count = len(heights)
     q = 2 * np.pi * np.fft.fftfreq(count, side / count)

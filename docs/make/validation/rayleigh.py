@@ -20,20 +20,18 @@ and I(γ)/γ is summed as a series of the spectra of hⁿ. Time exp(−iωt), le
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import resample
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.reference import boundary
 from mitsuba_diffraction.reference.fresnel import decaying_root
 
-from .cases import Case, Real
+from .cases import Case
 from .crossed import HORIZON, is_crossed, lowest_orders
 from .solutions import Orders
-
-Complex = NDArray[np.complex128]
 
 # Terms of the series of exp(iγh) end where they are below this
 _PRECISION = 1e-14
@@ -180,7 +178,7 @@ class _Spectra:
             heights = resample(resample(heights, 2 * nx, axis=1), 2 * ny, axis=0)
         self._heights, self._largest = heights, float(np.abs(heights).max())
 
-    def over_gamma(self, gamma: Complex, difference: NDArray[np.int64]) -> Complex:
+    def over_gamma(self, gamma: Complex, difference: Whole) -> Complex:
         """I(γ)/γ for orders that differ by (mx, my); mean over the period of exp(iγh + iQ·r)."""
         reach = float(np.abs(gamma).max()) * self._largest
         if reach > _LARGEST:

@@ -18,10 +18,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import gammaln
 
 from mitsuba_diffraction import reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.optics.geometry import (
     diffraction_coordinates,
@@ -80,7 +81,7 @@ def mean_brdf(
     wavelength: ArrayLike,
     *,
     coherence_width: float,
-) -> NDArray[np.float64]:
+) -> Real:
     """BRDF (R = 1) averaged over all such surfaces, in closed form; arguments as
     `reference.brdf` takes them, shape (n,) in 1/sr.
     """
@@ -111,16 +112,16 @@ def _terms(g: float) -> int:
 class Estimate:
     """Means over surfaces (n,), and the standard errors of those means."""
 
-    mean: NDArray[np.float64]
-    error: NDArray[np.float64]
+    mean: Real
+    error: Real
 
     @classmethod
-    def of(cls, samples: NDArray[np.float64]) -> Estimate:
+    def of(cls, samples: Real) -> Estimate:
         """Estimate the means of samples (surfaces, n)."""
         error = samples.std(axis=0, ddof=1) / np.sqrt(len(samples))
         return cls(samples.mean(axis=0), error)
 
-    def distance(self, exact: ArrayLike) -> NDArray[np.float64]:
+    def distance(self, exact: ArrayLike) -> Real:
         """How far the means are from `exact`, in standard errors."""
         return np.asarray((self.mean - np.asarray(exact)) / self.error)
 

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import jv
 
 from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.heights.coherence import usual_window
 from mitsuba_diffraction.optics.geometry import sigma_of
-
-Real = NDArray[np.float64]
 
 LIGHT = 45.0  # degrees; the detector is at the normal
 #: Degrees from the mirror direction of light from 30°, at which crops are compared.

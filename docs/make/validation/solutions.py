@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
-from .cases import DATA, MATERIALS, PROFILES, Case, Grating, Light, Media, Real, Surface
+from .cases import DATA, MATERIALS, PROFILES, Case, Grating, Light, Media, Surface
 from .patches import CELLS
 
 #: Polarisations of the light: s and p, which on gratings in light across the grooves have the
@@ -46,13 +47,13 @@ class Orders(NamedTuple):
     jones : (n, 2, 2) amplitudes about `boundary.polarisation_axes`, phases from height 0.
     """
 
-    order: NDArray[np.int64]
+    order: Whole
     powers: Real
     balance: Sequence[float] = (np.nan, np.nan)
-    jones: NDArray[np.complex128] | None = None
+    jones: Complex | None = None
 
     @classmethod
-    def of_amplitudes(cls, case: Case, order: NDArray[np.int64], jones: Any) -> Orders:
+    def of_amplitudes(cls, case: Case, order: Whole, jones: Any) -> Orders:
         """Return orders from their amplitudes."""
         index = case.index.real if case.media.through and case.index else 1.0
         cosines = index * np.abs(case.wo(order)[:, 2:]) / case.wi[2]
@@ -69,11 +70,11 @@ class Solved:
     """
 
     case: Case
-    order: NDArray[np.int64]
+    order: Whole
     powers: Real
     change: Real
     balance: Real
-    jones: NDArray[np.complex128]
+    jones: Complex
 
     @classmethod
     def between(cls, case: Case, coarse: Orders, fine: Orders) -> Solved:

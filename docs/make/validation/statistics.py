@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.heights.spectra import order_powers
 from mitsuba_diffraction.optics.geometry import wavenumber
 
@@ -23,9 +23,9 @@ _WAVELENGTH = 550.0  # nm
 class Specular:
     """Power of order 0 of random surfaces at normal incidence and exit, against κ·rms."""
 
-    kappa_rms: NDArray[np.float64]
+    kappa_rms: Real
     power: Estimate
-    exact: NDArray[np.float64]
+    exact: Real
     surfaces: int
 
 
@@ -37,17 +37,17 @@ class Lobe:
     theta: float
     wavelength: float
     coherence_width: float
-    angles: NDArray[np.float64]
+    angles: Real
     measured: Estimate
-    exact: NDArray[np.float64]
+    exact: Real
 
     @cached_property
-    def fine_angles(self) -> NDArray[np.float64]:
+    def fine_angles(self) -> Real:
         """Angles to draw the closed form at."""
         return np.linspace(self.angles.min(), self.angles.max(), 400)
 
     @cached_property
-    def fine_exact(self) -> NDArray[np.float64]:
+    def fine_exact(self) -> Real:
         """The closed form there."""
         return _exact(self.roughness, self.theta, self.fine_angles, self.coherence_width)
 
@@ -56,9 +56,9 @@ class Lobe:
 class Offsets:
     """Mean over windows at random places of a surface, and its `ensemble`."""
 
-    angles: NDArray[np.float64]
+    angles: Real
     patches: Estimate
-    ensemble: NDArray[np.float64]
+    ensemble: Real
     count: int
 
 
@@ -122,9 +122,7 @@ def random_windows(count: int, *, theta: float = 20.0, coherence_width: float = 
     return Offsets(angles, patches, ensemble, count)
 
 
-def _exact(
-    rough: Roughness, theta: float, angles: NDArray[np.float64], coherence_width: float
-) -> NDArray[np.float64]:
+def _exact(rough: Roughness, theta: float, angles: Real, coherence_width: float) -> Real:
     wi = in_plane(np.sin(np.radians(theta)))
     wo = in_plane(np.sin(np.radians(angles)))
     return mean_brdf(rough, wi, wo, _WAVELENGTH, coherence_width=coherence_width)

@@ -13,12 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import i0
 
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.heights.coherence import LOOKUP, SHARPENING, TAPER
 
-Real = NDArray[np.float64]
 #: Taper at places u from −1 to 1, the window's edges.
 Taper = Callable[[Real], Real]
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mitsuba_diffraction.arrays import Real
 
 from ..cases import PROFILES, Grating
 from ..closed_forms import ANGLES, deviations
@@ -74,5 +75,5 @@ is 1.
 {table(["rms", "directions", "root-mean-square", "largest"], lobes)}"""
 
 
-def _distances(z: NDArray[np.float64]) -> list[object]:
+def _distances(z: Real) -> list[object]:
     return [len(z), f"{np.sqrt(np.mean(z**2)):.2f}", f"{np.abs(z).max():.1f}"]
