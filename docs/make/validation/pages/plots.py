@@ -17,7 +17,7 @@ from ..cases import PROFILES, Case, Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, rms_slope
 from ..models import of_colours
-from ..statistics import Statistics
+from ..statistics import CORRELATION, THETA, WAVELENGTH, Statistics, exact_lobe
 from .markdown import percent
 
 _SMALLEST = 1e-4  # deviations below it are drawn on it
@@ -145,37 +145,34 @@ def _specular(axes: Axes, statistics: Statistics) -> None:
     axes.semilogy(x, np.exp(-(x**2)), color="black", lw=1, label="exp(−(κ·rms)²)")
     points = statistics.specular
     axes.errorbar(
-        points.kappa_rms, points.power.mean, 2 * points.power.error, fmt="o", ms=4,
-        label=f"{points.surfaces} surfaces, ± 2 standard errors",
+        points.places, points.mean, 2 * points.error, fmt="o", ms=4,
+        label=f"{points.count} surfaces, ± 2 standard errors",
     )  # fmt: skip
-    axes.semilogy(points.kappa_rms, points.exact, "_", ms=14, color="C3", label="with scattering")
+    axes.semilogy(points.places, points.exact, "_", ms=14, color="C3", label="with scattering")
     axes.set(xlabel="κ·rms", ylabel="mean power of order 0, |a₀|²", title="specular loss")
     _frame(axes)
 
 
 def _lobes(axes: Axes, statistics: Statistics) -> None:
-    for n, lobe in enumerate(statistics.lobes):
-        axes.semilogy(lobe.fine_angles, lobe.fine_exact, color=f"C{n}", lw=1)
+    for n, (rms, lobe) in enumerate(statistics.lobes.items()):
+        fine = np.linspace(lobe.places.min(), lobe.places.max(), 400)
+        axes.semilogy(fine, exact_lobe(rms, fine), color=f"C{n}", lw=1)
         axes.errorbar(
-            lobe.angles, lobe.measured.mean, 2 * lobe.measured.error, fmt="o", ms=3,
-            color=f"C{n}", label=f"rms {1000 * lobe.roughness.rms:g} nm",
+            lobe.places, lobe.mean, 2 * lobe.error, fmt="o", ms=3, color=f"C{n}",
+            label=f"rms {lobe.name}",
         )  # fmt: skip
-    lobe = statistics.lobes[0]
     axes.set(
         xlabel="exit angle (°)", ylabel="BRDF (1/sr)", ylim=(1e-4, None),
-        title=f"incidence {lobe.theta:g}°, {lobe.wavelength:g} nm, T = "
-        f"{lobe.roughness.correlation:g} µm",
+        title=f"incidence {THETA:g}°, {WAVELENGTH:g} nm, T = {CORRELATION:g} µm",
     )  # fmt: skip
     _frame(axes)
 
 
 def _offsets(axes: Axes, statistics: Statistics) -> None:
     offsets = statistics.offsets
-    ratio = offsets.patches.mean / offsets.ensemble
+    ratio = offsets.mean / offsets.exact
     axes.axhline(1, color="black", lw=1)
-    axes.errorbar(
-        offsets.angles, ratio, 2 * offsets.patches.error / offsets.ensemble, fmt="o", ms=4
-    )
+    axes.errorbar(offsets.places, ratio, 2 * offsets.error / offsets.exact, fmt="o", ms=4)
     axes.set(
         xlabel="exit angle (°)", ylabel="mean of patches / ensemble, ± 2 standard errors",
         title=f"windows at {offsets.count} random places",
