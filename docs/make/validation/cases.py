@@ -46,9 +46,8 @@ ALUMINIUM = {460.0: 0.646 + 5.590j, 610.0: 1.248 + 7.368j}
 #: Silicon's index by wavelength (nm): Mitsuba's own table (material `Si`), interpolated.
 SILICON = {460.0: 4.577 + 0.130j, 610.0: 3.906 + 0.022j}
 
-#: Indices of dielectrics; keratin's is the middle of what is reported for hair and scales
-#: (1.54–1.58).
-DIELECTRICS = {"keratin": 1.56, "glass": 1.5}
+#: Keratin's index, the middle of what is reported for hair and scales (1.54–1.58).
+KERATIN = 1.56
 
 _METALS = {"aluminium": ALUMINIUM, "silicon": SILICON}
 
@@ -123,13 +122,13 @@ class Media:
 
     Attributes
     ----------
-    material : of `index_of`.
+    material : of `index_of`, or "perfect".
     film : index and thickness (nm) of a film over the surface.
     coat : index of a clear coat; `once` leaves out the light that its face sends back.
     through : whether the orders are those that go through.
     """
 
-    material: str
+    material: str | complex
     film: tuple[complex, float] | None = None
     coat: float | None = None
     once: bool = False
@@ -231,15 +230,17 @@ def grating_cases(material: str) -> list[Case]:
     return list(_cases(material))
 
 
-def index_of(material: str, wavelength: float) -> complex:
-    """Index n + ik of a material at a wavelength (nm).
+def index_of(material: str | complex, wavelength: float) -> complex:
+    """Index n + ik of a material, or of a number itself, at a wavelength (nm).
 
     Under polycarbonate both are those inside: the index is over the coat's.
     """
     if material == "aluminium under polycarbonate":
         return index_of("aluminium", wavelength * COAT) / COAT
-    if material in DIELECTRICS:
-        return complex(DIELECTRICS[material])
+    if not isinstance(material, str):
+        return complex(material)
+    if material == "keratin":
+        return complex(KERATIN)
     nodes = _METALS[material]  # Mitsuba's tables are smooth between them
     return complex(np.interp(wavelength, list(nodes), list(nodes.values())))
 
@@ -247,7 +248,7 @@ def index_of(material: str, wavelength: float) -> complex:
 def index_text(material: str) -> str:
     """Return the index of a material in words, for files of solutions."""
     if material not in _METALS:
-        return f"{DIELECTRICS[material]:g}" if material in DIELECTRICS else "perfect conductor"
+        return f"{KERATIN:g}" if material == "keratin" else "perfect conductor"
     return ", ".join(f"{n:g} at {w:g} nm" for w, n in _METALS[material].items())
 
 

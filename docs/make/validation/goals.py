@@ -30,7 +30,7 @@ _SHARES = np.linspace(0.0, 1.0, 101)
 
 
 @dataclass(frozen=True)
-class Case:
+class Selection:
     """Deviation of colours at one angle, of a grating or of all gratings of a band.
 
     Attributes
@@ -125,7 +125,7 @@ def cuts_of_scales(cells: Sides, model: str) -> Cuts | None:
     return Cuts(float(np.mean(deviations)), max(deviations)) if deviations else None
 
 
-def much_worse(sides: Sides, material: str) -> list[Case]:
+def much_worse(sides: Sides, material: str) -> list[Selection]:
     """Gratings and angles that are worse than Kirchhoff by more than a tenth.
 
     Differences below the last refinement of the solver are left out.
@@ -149,7 +149,7 @@ def models_of(sides: Sides, material: str) -> dict[str, Comparison]:
     return {model: part for (name, model), part in sides.items() if name == material}
 
 
-def singles(models: Mapping[str, Comparison]) -> list[Case]:
+def singles(models: Mapping[str, Comparison]) -> list[Selection]:
     """Every grating and angle of one material, from its comparisons by model."""
     every = models["kirchhoff"]
     return [
@@ -160,7 +160,7 @@ def singles(models: Mapping[str, Comparison]) -> list[Case]:
     ]
 
 
-def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Case]:
+def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Selection]:
     """Every profile and band of depth/period at `models.ANGLES`."""
     for profile in PROFILES:
         for low, high in BANDS:
@@ -171,9 +171,9 @@ def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Case]:
 
 def _case(
     models: Mapping[str, Comparison], label: str, theta: float, gratings: Sequence[Grating]
-) -> Case:
+) -> Selection:
     parts = [
         {name: every.where(grating=grating, theta=theta) for name, every in models.items()}
         for grating in gratings
     ]
-    return Case(label, theta, parts)
+    return Selection(label, theta, parts)

@@ -207,7 +207,7 @@ def _crossed() -> Iterator[Compared]:
     lumps = 0.25 * (1.0 - np.cos(x)) * (1.0 - np.cos(y)) + 0.2 * np.sin(x)
     # without mirror planes, so that every sign shows
     field = HeightField(0.1 * (lumps + 0.1 * np.sin(x + 2.0 * y)), 0.5 / pixels)
-    case = Case(Sampled(field), Light(lam, theta, phi), Media("glass"))
+    case = Case(Sampled(field), Light(lam, theta, phi), Media(1.5))
     x, y = -case.wi[:2]
     station = CrossedStation(x, y, 1e-3 * lam, case.index, field.extent)
     solver = CrossedWaves(UnitCell(field.heights, field.extent), 5)

@@ -1,4 +1,4 @@
-"""What was asked of the default model: the tables of goals and of what misses them."""
+"""What was asked of the default model beside Kirchhoff's: goals, and what misses them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from docs.make.validation import goals
 from docs.make.validation.cases import Grating, index_of
 from docs.make.validation.compare import Sides, compare
-from docs.make.validation.models import compare_all
+from docs.make.validation.models import ANGLES, banded, compare_all
 from docs.make.validation.solutions import Solutions, shipped
 from mitsuba_diffraction.reference import boundary, model
 
@@ -21,7 +21,7 @@ def sides() -> Sides:
 
 
 @pytest.fixture(scope="module")
-def cases(sides) -> list[goals.Case]:
+def cases(sides) -> list[goals.Selection]:
     return goals.singles(goals.with_half(sides, "aluminium"))
 
 
@@ -45,6 +45,27 @@ def test_on_aluminium_few_gratings_are_worse_and_by_little(cases):
     assert gains.min() > -0.0085
     assert gains.max() > 0.05
     assert gains.mean() > 0.005
+
+
+def test_on_aluminium_it_is_no_worse_in_any_band(sides):
+    old, new = (list(banded(sides["aluminium", name])) for name in ("kirchhoff", "small_slope"))
+    for (name, band, before), (_, _, after) in zip(old, new, strict=True):
+        for theta, was, now in zip(ANGLES, before, after, strict=True):
+            # Kirchhoff's errors of the two polarisations cancel: blazed 1.1/0.1 µm at 30° has 47 %
+            # of the mean, 54 and 68 % of either; and where both are as good as exact
+            assert now <= max(1.01 * was, was + 5e-5), (name, band, theta)
+    assert new[0][2][2] < 0.3 * old[0][2][2]  # gentle sinusoids at 60°
+
+
+def test_on_aluminium_either_polarisation_is_far_better(sides):
+    chosen = {"profile": "sinusoidal", "period": 2.5, "theta": 60.0, "wavelength": 610.0}
+    old, new = (sides["aluminium", name].where(**chosen) for name in ("kirchhoff", "small_slope"))
+    for depth in (0.05, 0.1, 0.2):
+        for light in ("te", "tm"):
+            before, after = (
+                part.where(depth=depth).deviation(colours=True, light=light) for part in (old, new)
+            )
+            assert after < 0.4 * before, depth
 
 
 def test_shares_lie_between_the_two_matrices():
