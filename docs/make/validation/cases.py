@@ -188,9 +188,12 @@ class Case:
         return np.column_stack([tangential, -up if self.media.through else up])
 
     def has(self, **values: Any) -> bool:
-        """Whether surface, light and media have these values, such as theta=30.0."""
-        own = self._values
-        return all(name in own and own[name] == value for name, value in values.items())
+        """Whether surface, light and media have these values, or one of a list of them."""
+        own, missing = self._values, object()
+        return all(
+            own.get(name, missing) in (value if isinstance(value, list) else [value])
+            for name, value in values.items()
+        )
 
     @cached_property
     def _values(self) -> dict[str, Any]:

@@ -66,17 +66,14 @@ class Comparison:
 
     def where(self, **values: Any) -> Comparison:
         """The cases with these values, as `Solutions.where`."""
-        return Comparison(*self._chosen(s.case.has(**values) for s in self.solved))
+        pairs = zip(self.solved, self.others, strict=True)
+        kept = [(solved, other) for solved, other in pairs if solved.case.has(**values)]
+        return Comparison([solved for solved, _ in kept], [other for _, other in kept])
 
     def each(self) -> Iterator[Comparison]:
         """Yield the comparison of each case."""
         for solved, other in zip(self.solved, self.others, strict=True):
             yield Comparison([solved], [other])
-
-    def _chosen(self, keep: Iterator[bool]) -> tuple[list[Solved], list[Real]]:
-        pairs = zip(self.solved, self.others, keep, strict=True)
-        kept = [(solved, other) for solved, other, kept in pairs if kept]
-        return [solved for solved, _ in kept], [other for _, other in kept]
 
     def deviation(self, *, colours: bool = False, light: str | None = None) -> float:
         """Σ|η − η_rigorous| / Σ η_rigorous over the counted orders; NaN if there are none.

@@ -39,7 +39,6 @@ GRATINGS = tuple(
     Grating("sinusoidal", *lengths)
     for lengths in ((2.5, 0.025), (2.5, 0.05), (2.5, 0.08), (1.1, 0.035))
 )
-_PIXELS = 256
 
 
 def name() -> str:
@@ -68,7 +67,7 @@ def solve(case: Case, harmonics: int) -> Orders:
     alpha = m * wavelength / 1000 / grating.period - case.wi[0]
     epsilons = 1.0, film**2, case.index**2
     above, within, below = (decaying_root(e - alpha**2 + 0j) for e in epsilons)
-    heights = grating.heights(_PIXELS).heights[0] * float(wavenumber(wavelength))
+    heights = grating.field.heights[0] * float(wavenumber(wavelength))
     heights = heights - heights.mean()
     through = np.exp(1j * within * (2 * np.pi * thickness / wavelength))
     powers = []

@@ -121,7 +121,7 @@ class Cuts(NamedTuple):
 
 def cuts_of_scales(cells: Sides, model: str) -> Cuts | None:
     """Deviation on cuts of scales of keratin with slope 0.2; None where none are stored."""
-    deviations = of_cells(cells["keratin", model], kinds=("elaphe", "elaphe_like"), slope=0.2)
+    deviations = of_cells(cells["keratin", model], kind=["elaphe", "elaphe_like"], slope=0.2)
     return Cuts(float(np.mean(deviations)), max(deviations)) if deviations else None
 
 

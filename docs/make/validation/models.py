@@ -59,13 +59,7 @@ def compare_all(solutions: Mapping[str, Solutions]) -> Sides:
     }
 
 
-def of_cells(
-    comparison: Comparison, light: str | None = None, kinds: Sequence[str] | None = None,
-    **values: object,
-) -> list[float]:  # fmt: skip
-    """Deviations of colours of the cases on cells with these kinds and values."""
-    return [
-        case.deviation(colours=True, light=light)
-        for case in comparison.where(**values).each()
-        if kinds is None or any(case.where(kind=kind).solved for kind in kinds)
-    ]
+def of_cells(comparison: Comparison, light: str | None = None, **values: object) -> list[float]:
+    """Deviations of colours of the cases with these values, as `Case.has`."""
+    parts = comparison.where(**values).each()
+    return [part.deviation(colours=True, light=light) for part in parts]

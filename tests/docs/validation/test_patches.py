@@ -53,7 +53,7 @@ def test_what_is_kept_of_the_measured_scale_is_what_it_gives(shared_afm):
 
 def test_cuts_of_scales_meet_the_goal_on_average(keratin):
     default = keratin["keratin", "small_slope"]
-    cuts = of_cells(default, kinds=("elaphe", "elaphe_like"), slope=0.2)
+    cuts = of_cells(default, kind=["elaphe", "elaphe_like"], slope=0.2)
     assert len(cuts) >= 6
     assert np.mean(cuts) < 0.07
     # the goal for each, 10 %, is missed by one, where light is diffracted twice

@@ -14,12 +14,12 @@ from .measurements import Measurements
 
 #: Kinds of cells in two dimensions: name in the table, kinds of `patches.KINDS`, slope, material.
 _CELLS = (
-    ("keratin, cuts of scales, slope 0.2", ("elaphe", "elaphe_like"), 0.2, "keratin"),
-    ("keratin, cuts of scales, slope 0.09", ("elaphe", "elaphe_like"), 0.09, "keratin"),
-    ("keratin, CD's pits, slope 0.2", ("cd_pits",), 0.2, "keratin"),
-    ("keratin, CD's pits, slope 0.06", ("cd_pits",), 0.06, "keratin"),
-    ("aluminium, cuts of scales, slope 0.09", ("elaphe", "elaphe_like"), 0.09, "aluminium"),
-    ("aluminium, CD's pits, slope 0.06", ("cd_pits",), 0.06, "aluminium"),
+    ("keratin, cuts of scales, slope 0.2", ["elaphe", "elaphe_like"], 0.2, "keratin"),
+    ("keratin, cuts of scales, slope 0.09", ["elaphe", "elaphe_like"], 0.09, "keratin"),
+    ("keratin, CD's pits, slope 0.2", ["cd_pits"], 0.2, "keratin"),
+    ("keratin, CD's pits, slope 0.06", ["cd_pits"], 0.06, "keratin"),
+    ("aluminium, cuts of scales, slope 0.09", ["elaphe", "elaphe_like"], 0.09, "aluminium"),
+    ("aluminium, CD's pits, slope 0.06", ["cd_pits"], 0.06, "aluminium"),
 )
 #: Largest depth/period of walls that count as low.
 _LOW = 0.08
@@ -100,9 +100,9 @@ def _gratings(measured: Measurements) -> list[list[object]]:
 
 def _cells(measured: Measurements) -> list[list[object]]:
     rows = []
-    for name, kinds, slope, material in _CELLS:
+    for name, kind, slope, material in _CELLS:
         kirchhoff, *default = (
-            of_cells(measured.cells[material, model], kinds=kinds, slope=slope, theta=theta)
+            of_cells(measured.cells[material, model], kind=kind, slope=slope, theta=theta)
             for model, theta in (
                 ("kirchhoff", 60.0),
                 *(("small_slope", a) for a in (60.0, 0.0, 30.0)),
