@@ -12,7 +12,8 @@ from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve.profiles import Profile
 from mitsuba_diffraction.orders.solve.stations import Grating, Solver, Station
 
-from .cases import PIXELS
+from .cases import PIXELS, Case
+from .solutions import Orders
 
 
 class Beam(NamedTuple):
@@ -49,6 +50,15 @@ def powers_of(solver: Solver, light: Beam) -> dict[int, Real]:
     amplitudes = solver.amplitudes(light.station)[0, light.channel]
     powers = (np.abs(amplitudes) ** 2).sum(axis=-1)
     return {light.channel - q: powers[:, q] for q in range(powers.shape[1])}
+
+
+def solved_by(solver: Solver, case: Case) -> Orders:
+    """Return the reflected orders of a case by a solver of the package."""
+    assert case.index is not None
+    (x, y, _), period = case.wi, case.field.extent[0]
+    powers = powers_of(solver, light_of(period, 1e-3 * case.light.wavelength, case.index, -x, y))
+    order = np.array([(m, 0) for m in sorted(powers)])
+    return Orders(order, np.array([powers[m] for m, _ in order]))
 
 
 def heights_of(profile: Profile, pixels: int = PIXELS, rows: int = 2) -> HeightField:

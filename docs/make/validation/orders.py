@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from mitsuba_diffraction import OrderTable
-from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
@@ -27,8 +26,8 @@ from mitsuba_diffraction.orders.solve.stations import Grating, Solver
 
 from .cases import Case, Light, Media, Sampled
 from .compare import Comparison, compare
-from .light import heights_of, light_of, light_on, powers_of
-from .solutions import Orders, Solutions, Solved
+from .light import heights_of, light_on, powers_of, solved_by
+from .solutions import Solutions, Solved
 
 FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 #: Tables, and (θ, φ) of the light in degrees: across the grooves, oblique and along them.
@@ -138,12 +137,10 @@ class Shipped:
         for wavelength in wavelengths:
             light = Light(wavelength / superstrate, inside, phi)
             case = Case(self.surface, light, Media(self._index(wavelength)))
-            powers = self._truth(case)
-            order = np.array(sorted(powers))
-            numbers = np.stack([order, np.zeros_like(order)], axis=1)
-            found = Orders(numbers, np.array([powers[m] for m in order]))
+            found = solved_by(self.solver, case)
             solved.append(Solved.between(case, found, found))
-            values = self.table.efficiency(-case.wi[0], case.wi[1], wavelength, order)
+            x, y, _ = case.wi
+            values = self.table.efficiency(-x, y, wavelength, found.order[:, 0])
             by_table.append(np.repeat(values[:, None], 2, axis=1))
         return compare(Solutions(solved), "small_slope"), Comparison(solved, by_table)
 
@@ -207,10 +204,3 @@ class Shipped:
         if self.name in ("cd", "dvd"):
             return CoupledWaves(self.recipe.profile, COUPLED)
         return Chandezon(self.recipe.profile, CHANDEZON)
-
-    def _truth(self, case: Case) -> dict[int, Real]:
-        """Return the efficiencies (2,) of all orders by the solver beside."""
-        assert case.index is not None
-        x, y, _ = case.wi
-        lam = 1e-3 * case.light.wavelength
-        return powers_of(self.solver, light_of(self.table.period, lam, case.index, -x, y))

@@ -76,7 +76,7 @@ ESTIMATORS = {
 
 @dataclass(frozen=True)
 class Seen:
-    """Light of low relief through windows over that through the light's Gaussian window.
+    """Light of windows or crops over that of the whole through the light's Gaussian window.
 
     Attributes
     ----------
@@ -86,6 +86,12 @@ class Seen:
 
     ratio: float
     worst: float
+
+    @classmethod
+    def between(cls, light: Real, whole: Real) -> Seen:
+        """Compare light with that of the whole by wavelength."""
+        worst = np.exp(np.abs(np.log(light / whole)).max())
+        return cls(float(light.mean() / whole.mean()), float(worst))
 
 
 def lobe_widths(estimator: Estimator, count: int = 300) -> Real:
@@ -126,10 +132,7 @@ def seen(estimator: Estimator, spectrum: Callable[[Real, Real], Real], width: fl
         near = surface[:, columns]
         kappa = k * (np.cos(light) + np.cos(out))
         values.append([kappa**2 * (e @ (near @ e)) / e.sum() ** 2 for e in (lobe, ideal)])
-    ours, exact = np.array(values).T
-    return Seen(
-        float(ours.mean() / exact.mean()), float(np.exp(np.abs(np.log(ours / exact)).max()))
-    )
+    return Seen.between(*np.array(values).T)
 
 
 def _transform(taper: Taper, width: float, q: Real) -> Real:

@@ -35,5 +35,5 @@ def test_a_white_spectrum_is_seen_as_it_is():
 def test_crops_have_the_light_of_the_whole():
     for found in scans.crops(120, (7.0, 10.0), np.arange(430.0, 801.0, 50.0)):
         # 120 crops whose light scatters by 0.6 have a mean within 6 %
-        assert found.ratio == pytest.approx(1.0, abs=0.16)
-        assert found.worst < 1.3
+        assert found.seen.ratio == pytest.approx(1.0, abs=0.16)
+        assert found.seen.worst < 1.3

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ..cases import PROBE_GRATING, Grating
 from ..compare import Comparison, angles_of, table_of
-from ..limits import rms_slope
 from .markdown import angle, percent, table
 from .measurements import Measurements
 
@@ -37,7 +36,7 @@ def _probe(measured: Measurements) -> str:
     ]  # fmt: skip
     return f"""## A gentle sinusoid
 
-Period {grating.period:g} µm, depth {grating.depth:g} µm, RMS slope {rms_slope(grating):.3f},
+Period {grating.period:g} µm, depth {grating.depth:g} µm, RMS slope {grating.field.rms_slope:.3f},
 unpolarised light. At normal incidence the relative error of the orders −2 to 2 is at most
 {percent(to_550)} up to 550 nm, and {percent(from_450)} from 450 to {wavelengths[-1]:g} nm.
 

@@ -7,7 +7,7 @@ import numpy as np
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
 from ..compare import GRAZING, gratings_of, table_of
-from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope
+from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT
 from ..models import ANGLES, of_cells, of_colours
 from .markdown import percent, table
 from .measurements import Measurements
@@ -78,10 +78,10 @@ def _gratings(measured: Measurements) -> list[list[object]]:
         walls = [g for p in ("lamellar", "blazed") for g in gratings_of(default, p)]
         groups = {
             f"sinusoidal, slope up to {GENTLE_SLOPE:g}": [
-                g for g in sinusoids if rms_slope(g) <= GENTLE_SLOPE
+                g for g in sinusoids if g.field.rms_slope <= GENTLE_SLOPE
             ],
             f"sinusoidal, slope {GENTLE_SLOPE:g} to {STEEP_SLOPE:g}": [
-                g for g in sinusoids if GENTLE_SLOPE < rms_slope(g) <= STEEP_SLOPE
+                g for g in sinusoids if GENTLE_SLOPE < g.field.rms_slope <= STEEP_SLOPE
             ],
             f"walls, depth/period up to {_LOW:g}": [g for g in walls if g.depth <= _LOW * g.period],
             f"walls, depth/period above {_LOW:g}": [g for g in walls if g.depth > _LOW * g.period],

@@ -15,7 +15,7 @@ from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
 from ..cases import PROFILES, Case, Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of
-from ..limits import GENTLE_ERROR, STEEP_ERROR, rms_slope
+from ..limits import GENTLE_ERROR, STEEP_ERROR
 from ..models import of_colours
 from ..statistics import CORRELATION, THETA, WAVELENGTH, Statistics, exact_lobe
 from .markdown import percent
@@ -28,7 +28,7 @@ def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Compariso
     figure, axes = _figure(11.5, 4.8, len(default))
     for panel, (material, blend) in zip(axes, default.items(), strict=True):
         sinusoids = gratings_of(blend, "sinusoidal")
-        slopes = np.array([rms_slope(grating) for grating in sinusoids])
+        slopes = np.array([grating.field.rms_slope for grating in sinusoids])
         angles = angles_of(blend.where(profile="sinusoidal"))
         for part, marker, fill, name in (
             (kirchhoff[material], "s", "none", "Kirchhoff"),
@@ -198,7 +198,7 @@ def _of_orders(comparison: Comparison, value: Callable[[Case], Any]) -> NDArray[
 
 def _title(grating: Grating) -> str:
     edges = grating.profile != "sinusoidal"  # with a slope beyond what pixels can tell
-    return str(grating) if edges else f"{grating}, RMS slope {rms_slope(grating):.2f}"
+    return str(grating) if edges else f"{grating}, RMS slope {grating.field.rms_slope:.2f}"
 
 
 def _frame(axes: Axes, **legend: Any) -> None:
