@@ -77,7 +77,7 @@ gallery: setup  ## make docs/gallery.md and the pictures of docs/meshes.md
 	@$(PYTHON3) -m docs.make.figures.gallery -o docs
 
 evaluation: setup  ## make docs/thesis.md: ridges, grating equation, fitted periods
-	@$(PYTHON3) -m docs.make.figures.evaluation -o docs/thesis.md $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures.thesis evaluation $(if $(MEASURED),--measured $(MEASURED))
 
 sweeps: setup  ## make docs/thesis.md: contact sheets of BRDF maps
 	@$(PYTHON3) -m docs.make.figures.thesis sweeps $(if $(MEASURED),--measured $(MEASURED))
@@ -94,8 +94,7 @@ plan: setup  ## plan the snake's scene: docs/performance.md
 	@$(RUN) plan scenes/snake.xml --json out/plan.json
 	@$(PYTHON3) -m docs.make.figures.tables plan out/plan.json
 
-parameters: setup  ## make docs/parameters.md, commands.md and python.md of the code
-	@$(PYTHON3) -m docs.make.figures.parameters -o docs/parameters.md
+parameters: setup  ## make docs/parameters.md, commands.md, python.md and formats.md of the code
 	@$(PYTHON3) -m docs.make.figures.interfaces -o docs
 
 notebooks: setup  ## run the notebooks, and keep what they show in their files

@@ -30,6 +30,7 @@ from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.scene.load import set_variant
 
 from ..figures.pages import (
+    from_json,
     measured_options,
     measured_patch,
     option,
@@ -131,7 +132,12 @@ def main(args: argparse.Namespace) -> None:
 
     if args.json is not None:
         check_outputs([args.json])
-    earlier = figures.read_run(args.against) if args.against is not None else None
+    earlier = None
+    if args.against is not None:
+        earlier = from_json(
+            args.against, lambda run: {part: run[part] for part in ("machine", "sections")},
+            writer="docs.make.bench --json", remedy="give such a file",
+        )  # fmt: skip
     parts = tuple(args.only or PARTS)
     if not {"snake", "orders", "efficiency", "colours", "frames"}.isdisjoint(parts):
         _check_scenes(args.scenes)

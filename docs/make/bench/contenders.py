@@ -15,9 +15,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from mitsuba.python import tensor_io
-from numpy.typing import NDArray
 
 from mitsuba_diffraction.analysis.timing import PIXEL, Queries, quiet_bsdf
+from mitsuba_diffraction.arrays import Single
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.plugin.device_table import device_table
@@ -156,7 +156,7 @@ AZIMUTHS, ANGLES, WAVELENGTHS, SIDE = 8, 8, 195, 32
 def write_measured(path: Path) -> None:
     """A surface that reflects alike everywhere: values do not matter for the time that it takes."""
 
-    def ones(*shape: int) -> NDArray[np.float32]:
+    def ones(*shape: int) -> Single:
         return np.ones(shape, np.float32)
 
     arrays: dict[str, Any] = {

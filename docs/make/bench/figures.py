@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
-
-from mitsuba_diffraction.errors import DiffractionError
 
 
 @dataclass(frozen=True)
@@ -115,19 +111,6 @@ def _number(value: float | None) -> str:
     if abs(value) >= 1000:
         return f"{value:.0f}"
     return f"{value:.3g}" if abs(value) < 1 else f"{value:#.3g}".rstrip(".")
-
-
-def read_run(path: Path) -> dict[str, Any]:
-    """Read the measurements of an earlier run."""
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(document["sections"], list) and isinstance(document["machine"], dict):
-            return dict(document)
-    except OSError as error:
-        raise DiffractionError(f"cannot read '{path}': {error.strerror}") from error
-    except (ValueError, KeyError, TypeError):
-        pass
-    raise DiffractionError(f"'{path}' is not what docs.make.bench --json writes; give such a file")
 
 
 def compared(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:

@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Real, Single
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.scene.pictures import read_exr
 
@@ -21,8 +22,6 @@ from .views import View
 
 #: Program that renders views in Blender, and the script that it adds exported materials with.
 _INSIDE = Path(__file__).with_name("inside.py")
-
-Picture = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -38,8 +37,8 @@ class Comparison:
     seconds : of Cycles, for all samples.
     """
 
-    mitsuba: Picture
-    cycles: Picture
+    mitsuba: Single
+    cycles: Single
     difference: float
     noise: float
     noise_of_cycles: float
@@ -91,7 +90,7 @@ def compare(
     return found
 
 
-def blocks(picture: NDArray[Any], side: int) -> NDArray[np.float64]:
+def blocks(picture: NDArray[Any], side: int) -> Real:
     """Return the means over blocks of pixels; the rest at the right and below is left out."""
     rows, columns = (size // side for size in picture.shape[:2])
     cut = picture[: rows * side, : columns * side].astype(np.float64)
@@ -99,14 +98,14 @@ def blocks(picture: NDArray[Any], side: int) -> NDArray[np.float64]:
 
 
 def _mean_delta_e(
-    reference: Picture, other: Picture, exposure: float, covered: NDArray[np.bool_]
+    reference: Single, other: Single, exposure: float, covered: NDArray[np.bool_]
 ) -> float:
     return float(np.nanmean(delta_e(reference, other, exposure=exposure)[covered]))
 
 
 def _cycles(
     views: Sequence[View], folder: Path, samples: int, working_space: str
-) -> tuple[list[tuple[Picture, Picture]], list[Seconds]]:
+) -> tuple[list[tuple[Single, Single]], list[Seconds]]:
     """Render all views twice, in one process."""
     jobs = [
         {

@@ -13,7 +13,8 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
+
+from mitsuba_diffraction.arrays import Single
 
 #: Shapes of unit radius, or half side, around the origin, as Mitsuba names them.
 SHAPES = ("disk", "rectangle", "sphere")
@@ -103,7 +104,7 @@ class View:
         }
 
 
-def sky_radiance() -> NDArray[np.float32]:
+def sky_radiance() -> Single:
     """Return an environment map (`_ROWS`, 2 `_ROWS`, 3): a grey sky, brighter around a low sun.
 
     Row 0 is up. The columns begin at −x and run towards +y, as Blender's.

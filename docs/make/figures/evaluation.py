@@ -1,10 +1,4 @@
-"""Page on the grating equation: every method on every patch, in pictures and numbers.
-
-    python -m docs.make.figures.evaluation -o docs/thesis.md \\
-        --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
-
-The picture goes to `images/evaluation.png` beside the page, the numbers between its markers.
-"""
+"""The grating equation: every method on every patch, in a picture and numbers of docs/thesis.md."""
 
 from __future__ import annotations
 
@@ -16,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
@@ -36,14 +30,12 @@ from mitsuba_diffraction.thesis.period_fit import (
 from mitsuba_diffraction.thesis.period_fit.plot import draw
 
 from . import pages
-from .pages import measured_options, measured_patch, option, program
 
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc")
 
 _DPI = 85
 _STEP = 5.0  # nm
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 
@@ -72,8 +64,8 @@ def evaluate_patch(
     patch: HeightField,
     nominal: float | None,
     *,
-    wavelengths: Array,
-    angles: Array,
+    wavelengths: Real,
+    angles: Real,
     windows: int,
     methods: Sequence[str] = METHODS,
     coherence_width: float = 65.0,
@@ -145,21 +137,14 @@ def period_table(patches: Sequence[Periods]) -> str:
     return pages.table(header, rows)
 
 
-@program(
-    option("-o", "--output", type=Path, default=Path("docs/thesis.md")),
-    *measured_options("height field that is evaluated, too"),
-    option("--windows", type=int, default=64),
-    option("--angle-step", type=float, default=0.05, help="degrees"),
-    option("--small", action="store_true", help="gratings only, coarsely: a check"),
-)
-def main(args: argparse.Namespace) -> None:
-    """Make the picture and the tables."""
+def write_evaluation(args: argparse.Namespace, measured: HeightField | None) -> None:
+    """Make the picture and the table of periods."""
+    page = args.output or Path("docs/thesis.md")
     # with the periods that they are made with
     patches: list[tuple[HeightField, float | None]] = [
         (blazed(2.5, 0.25, pixels_per_period=60, rows=2), 2.5),
         (sinusoidal(1.6, 0.1, rows=2), 1.6),
     ]
-    measured = measured_patch(args)
     if measured is not None:
         patches.append((measured, None))
     if not args.small:
@@ -174,6 +159,6 @@ def main(args: argparse.Namespace) -> None:
                 patch, nominal, wavelengths=wavelengths, angles=angles, windows=args.windows
             )
         )
-    pages.update(args.output, {"periods": period_table(results)})
-    picture = args.output.parent / "images" / "evaluation.png"
+    pages.update(page, {"periods": period_table(results)})
+    picture = page.parent / "images" / "evaluation.png"
     pages.write_figure(picture, evaluation_figure(results))

@@ -1,4 +1,7 @@
-"""Make docs/commands.md of the parser of the commands, and docs/python.md of the public names.
+"""Pages that the code writes: docs/commands.md, python.md and parameters.md, and tables of formats.
+
+Commands are those of the parser, names those of `md`, parameters those of the plugins' docstrings
+(`parameters`), and formats those of `info --formats`.
 
 python -m docs.make.figures.interfaces -o docs
 """
@@ -12,9 +15,10 @@ from types import ModuleType
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.heights.formats.catalogue import sections
 from mitsuba_diffraction.heights.read import OPTIONS
 
-from . import pages
+from . import pages, parameters
 from .pages import option, program
 
 #: Commands by what they are for, in the order of the page.
@@ -129,13 +133,31 @@ def _members(value: object) -> str:
 # Names of a module that the page lists.
 _MOST = 10
 
+
+def format_tables() -> str:
+    """Return the tables of docs/formats.md with their titles as headings."""
+    parts = []
+    for title, rows in sections().items():
+        columns = [c for c in rows[0] if any(row[c] != "none" for row in rows)]
+        marks = {"format": "**", "suffixes": "`"}
+        cells = [
+            tuple(f"{(m := marks.get(c, ''))}{r[c]}{m}".replace("none", "") for c in columns)
+            for r in rows
+        ]
+        parts += [f"## {title.capitalize()}", pages.table(tuple(columns), cells)]
+    return re.sub(r"(--[a-z][a-z-]+)", r"`\1`", "\n\n".join(part.strip() for part in parts))
+
+
 #: Pages by the name of their file.
-PAGES = {"commands.md": commands_page, "python.md": python_page}
+PAGES = {
+    "commands.md": commands_page, "python.md": python_page, "parameters.md": parameters.page,
+}  # fmt: skip
 
 
 @program(option("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs")))
 def main(args: argparse.Namespace) -> None:
-    """Write the pages."""
+    """Write the pages, and the tables into theirs."""
     for name, made in PAGES.items():
         pages.write_text(args.output / name, made())
         print(f"wrote {args.output / name}")
+    pages.update(args.output / "formats.md", {"formats": format_tables()})

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from docs.make.blender.compare import blocks
+from mitsuba_diffraction.arrays import Real, Single
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import natural
 from mitsuba_diffraction.scene.load import load_scene, set_variant
@@ -107,7 +108,7 @@ _HEADER = (
 class Rendered:
     """Linear sRGB (ny, nx, 3) of blocks of pixels, file for a display, and processor time, s."""
 
-    pixels: NDArray[np.float32]
+    pixels: Single
     display: Path
     seconds: float
 
@@ -159,7 +160,7 @@ def _render(scene: Scene, output: Path, options: Sequence[str]) -> Rendered:
     return Rendered(pixels, output.with_suffix(".png"), seconds)
 
 
-def _show(model: Rendered, solved: Rendered, difference: NDArray[np.float64], target: Path) -> None:
+def _show(model: Rendered, solved: Rendered, difference: Real, target: Path) -> None:
     """Write both pictures and a map of their difference side by side."""
     target.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(model.display) as picture:

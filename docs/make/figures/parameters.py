@@ -1,11 +1,10 @@
 """The reference of the plugins' parameters, made of the plugins' own docstrings.
 
-python -m docs.make.figures.parameters -o docs/parameters.md
+`python -m docs.make.figures.interfaces` writes it.
 """
 
 from __future__ import annotations
 
-import argparse
 import ast
 import re
 import textwrap
@@ -17,7 +16,6 @@ import mitsuba_diffraction
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
-from .pages import option, program
 
 _FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 #: Modules of the plugins; read, not imported, which would need a variant of Mitsuba.
@@ -137,14 +135,3 @@ def _prose(text: str) -> str:
         indented = paragraph.startswith("    ")
         shown.append(paragraph if indented else " ".join(paragraph.split()))
     return "\n\n".join(shown)
-
-
-@program(
-    option(
-        "-o", "--output", metavar="FILE", type=Path, default=Path("docs/parameters.md"),
-        help="page to write; default: docs/parameters.md",
-    ),
-)  # fmt: skip
-def main(args: argparse.Namespace) -> None:
-    """Write the page."""
-    pages.write_text(args.output, page())

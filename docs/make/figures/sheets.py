@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from docs.make.validation.light import direction, heights_of, light_on
+from docs.make.validation.cases import direction
+from docs.make.validation.compare import misplaced
+from docs.make.validation.light import heights_of, light_on
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders.solve.grating_index import material_of
@@ -74,7 +76,7 @@ def _missed(case: Case, theta: float, phi: float, wavelength: float) -> float:
         eta=_INDEX, thin=True, coherence_width=_WIDTH,
     )  # fmt: skip
     others = orders != 0
-    return float(np.abs(values * np.pi / width**2 - solved)[others].sum() / solved[others].sum())
+    return misplaced(values * np.pi / width**2, solved, others)
 
 
 @program(option("-o", "--output", type=Path, default=Path("docs"), help="of the page"))

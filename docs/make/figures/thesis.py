@@ -1,11 +1,12 @@
-"""The methods of the thesis: the table of docs/thesis.md, and the page of sweeps.
+"""The methods of the thesis: tables and pictures of docs/thesis.md.
 
     python -m docs.make.figures.thesis methods \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
     python -m docs.make.figures.thesis sweeps
+    python -m docs.make.figures.thesis evaluation
 
-What is written goes between markers: a table, and how far each map of a sweep is from the best.
-Contact sheets of sweeps go to `images/sweep-KIND.png` beside the page.
+What is written goes between markers: a table, how far each map of a sweep is from the best, and
+fitted periods. Pictures go to `images/sweep-KIND.png` and `images/evaluation.png` beside the page.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from mitsuba_diffraction.thesis.sweeps import (
 )
 
 from . import pages
+from .evaluation import write_evaluation
 from .pages import measured_options, measured_patch, option, program
 
 #: What each method leaves out.
@@ -171,15 +173,17 @@ def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
     pages.update(page, parts)
 
 
-PROGRAMS = {"methods": write_methods, "sweeps": write_sweeps}
+PROGRAMS = {"methods": write_methods, "sweeps": write_sweeps, "evaluation": write_evaluation}
 
 
 @program(
     option("page", choices=tuple(PROGRAMS)),
     option("-o", "--output", type=Path, help="default: that page in docs"),
-    *measured_options("scale to take; default: elaphe_like"),
+    *measured_options("scale to take; default: elaphe_like, and further ones of the evaluation"),
     option("--only", metavar="KIND", action="append", choices=tuple(SWEEPS)),
     option("--resolution", type=int, help="of maps; default: 128, of sweeps 160"),
+    option("--windows", type=int, default=64, help="single windows of the evaluation"),
+    option("--angle-step", type=float, default=0.05, help="of the evaluation, degrees"),
     option("--small", action="store_true", help="small patches: a check"),
 )
 def main(args: argparse.Namespace) -> None:

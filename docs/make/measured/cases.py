@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from docs.make.figures.pages import write_text
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.orders.solve.profiles import Profile
 
 from . import predict
 from .grooves import Groove
-
-Real = NDArray[np.float64]
 
 _DATA = Path(__file__).parent / "data"
 #: File of the fitted grooves.

@@ -13,14 +13,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import mitsuba_diffraction  # noqa: F401  (sets Dr.Jit up before Mitsuba)
 from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics import colour
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA
-
-Real = NDArray[np.float64]
 
 #: Repository of the maps.
 REPOSITORY = "https://github.com/KAIST-VCLAB/color-brdfs-with-wave-optics"

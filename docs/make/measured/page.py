@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from docs.make.validation.pages.markdown import table
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile
@@ -17,8 +17,6 @@ from mitsuba_diffraction.orders.solve.profiles import Profile
 from . import cases, outside, predict, shapes
 from .cases import Case
 from .grooves import Groove
-
-Real = NDArray[np.float64]
 
 # three colours that keep apart in grey and for colour-blind readers
 _STYLES = {"modelled": ("#d55e00", "--"), "solved": ("#0072b2", "-")}

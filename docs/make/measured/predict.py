@@ -6,19 +6,18 @@ Each function takes wavelengths in nm and returns efficiencies of the same shape
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from docs.make.validation.light import heights_of, light_of, powers_of
-from docs.make.validation.model import efficiencies, in_plane
+from docs.make.validation.cases import Case, Light, Media, Sampled, in_plane
+from docs.make.validation.light import heights_of, solved_by
+from docs.make.validation.model import modelled
 from mitsuba_diffraction import reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile
 from mitsuba_diffraction.orders.solve.stations import Solver, Station
-
-Real = NDArray[np.float64]
 
 # y of light in the plane across the grooves; at 0 exactly the two polarisations are the same
 _ALONG = 0.0
@@ -43,38 +42,39 @@ def littrow_solved(
 ) -> Real:
     """Order −1 that returns along its own light, by Chandezon's method or another solver."""
     solver = solver or Chandezon(profile, 10 + round(1.6 * profile.period))
-    values = []
-    for lam in wavelengths:
-        sine = 0.5e-3 * lam / profile.period
-        light = light_of(profile.period, 1e-3 * lam, index_of(material, lam), sine, _ALONG)
-        values.append(powers_of(solver, light)[-1].mean())
-    return np.array(values)
+    found = [solved_by(solver, case) for case in _littrow(material, profile, wavelengths)]
+    return np.array([orders.powers[orders.order[:, 0] == -1].mean() for orders in found])
 
 
 def littrow_modelled(material: str, profile: Profile, wavelengths: Real) -> Real:
     """Order −1 that returns along its own light, by the model."""
-    field, values = heights_of(profile), []
-    for lam in wavelengths:
-        wi = in_plane(-0.5e-3 * lam / profile.period)
-        index = index_of(material, lam)
-        powers = efficiencies(field, index, wi, wi[None], lam, _MODEL, sigma=profile.period)
-        values.append(float(powers[0]))
-    return np.array(values)
+    cases = _littrow(material, profile, wavelengths)
+    return np.array([modelled(case, np.array([[-1, 0]]), _MODEL).mean() for case in cases])
+
+
+def _littrow(material: str, profile: Profile, wavelengths: Real) -> list[Case]:
+    angles = -np.degrees(np.arcsin(0.5e-3 * wavelengths / profile.period))
+    return _cases(material, profile, wavelengths, angles)
+
+
+def _cases(material: str, profile: Profile, wavelengths: Real, angles: Real | float) -> list[Case]:
+    surface = Sampled(heights_of(profile))
+    lights = np.broadcast_arrays(wavelengths, angles)
+    return [
+        Case(surface, Light(lam, theta), Media(index_of(material, lam)))
+        for lam, theta in zip(*(each.tolist() for each in lights), strict=True)
+    ]
 
 
 def normal_pair(profile: Profile, material: str, wavelengths: Real) -> tuple[Real, Real]:
     """Orders ±1 together, p-polarised along the normal: by Chandezon's method and by the model."""
-    solver, field = Chandezon(profile, 20), heights_of(profile)
-    solved, modelled = [], []
-    for lam in wavelengths:
-        index = index_of(material, lam)
-        light = light_of(profile.period, 1e-3 * lam, index, 1e-9, _ALONG)
-        powers = powers_of(solver, light)
-        solved.append(powers[-1][1] + powers[1][1])
-        wo = in_plane(1e-3 * lam / profile.period * np.array([-1.0, 1.0]))
-        light_in = in_plane(0.0), wo, lam, _MODEL
-        modelled.append(efficiencies(field, index, *light_in, sigma=profile.period).sum())
-    return np.array(solved), np.array(modelled)
+    solver, pair = Chandezon(profile, 20), np.array([[-1, 0], [1, 0]])
+    solved, model = [], []
+    for case in _cases(material, profile, wavelengths, -1e-7):
+        found = solved_by(solver, case)
+        solved.append(found.powers[np.abs(found.order[:, 0]) == 1, 1].sum())
+        model.append(modelled(case, pair, _MODEL).mean(axis=1).sum())
+    return np.array(solved), np.array(model)
 
 
 def face(index: float) -> float:

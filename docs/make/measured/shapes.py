@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.fresnel import Filmed, normal_reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
@@ -15,8 +15,6 @@ from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from . import predict
 from .cases import GLASS
 from .grooves import Groove
-
-Real = NDArray[np.float64]
 
 _WAVELENGTHS = np.arange(405.0, 706.0, 50.0)
 #: Periods (µm) of a grating of aluminium in light that returns along itself, and of one of glass.

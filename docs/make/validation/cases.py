@@ -1,4 +1,4 @@
-"""Gratings, lights and materials for which the model is compared with rigorous solutions.
+"""Cases for which the model is compared with rigorous solutions: a surface, its light and media.
 
 Angles are those of the light's direction in the plane of the grooves' normal, positive towards +x;
 order m leaves at sinθo = mλ/d − sinθi, positive towards +x too. Blazed gratings ascend towards +x:
@@ -9,13 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from mitsuba_diffraction.arrays import Real, Whole
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
 
+#: Folder of the stored solutions.
+DATA = Path(__file__).parent / "data"
 PROFILES = ("sinusoidal", "lamellar", "blazed")
 MATERIALS = ("perfect", "aluminium", "keratin")
 
@@ -51,6 +58,15 @@ COAT = 1.58
 PIXELS = 512
 
 
+class Surface(Protocol):
+    """Surface of a case: a `Grating`, or a cell of `patches`; its text is its name in files."""
+
+    @property
+    def field(self) -> HeightField:
+        """Heights of one period."""
+        ...
+
+
 @dataclass(frozen=True)
 class Grating:
     """Period of a grating; `period` and `depth` (peak to valley) in µm."""
@@ -76,22 +92,134 @@ class Grating:
             self.period, self.depth, periods=1, pixels_per_period=pixels, rows=2, **ascends
         )
 
+    @cached_property
+    def field(self) -> HeightField:
+        """Heights with `PIXELS` samples."""
+        return self.heights()
+
     def __str__(self) -> str:
         return f"{self.profile} {self.period:g}/{self.depth:g} µm"
 
 
-@dataclass(frozen=True)
-class Scan:
-    """Grating in light from one direction (θi in degrees), at several wavelengths (nm)."""
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Any heights."""
 
-    grating: Grating
-    material: str
+    field: HeightField
+
+
+class Light(NamedTuple):
+    """Light of one wavelength (nm) from a direction (degrees); phi is from across the grooves."""
+
+    wavelength: float
     theta: float
-    wavelengths: tuple[float, ...]
+    phi: float = 0.0
 
 
-def scans(material: str) -> list[Scan]:
-    """All scans of one material, in a fixed order.
+@dataclass(frozen=True)
+class Media:
+    """Material beneath a surface, and what lies over it.
+
+    Attributes
+    ----------
+    material : of `index_of`, or "perfect".
+    film : index and thickness (nm) of a film over the surface.
+    coat : index of a clear coat; `once` leaves out the light that its face sends back.
+    through : whether the orders are those that go through.
+    """
+
+    material: str | complex
+    film: tuple[complex, float] | None = None
+    coat: float | None = None
+    once: bool = False
+    through: bool = False
+
+    @property
+    def layer(self) -> dict[str, Any]:
+        """Arguments of `reference.brdf` for film or coat."""
+        return {name: v for name in ("film", "coat") if (v := getattr(self, name)) is not None}
+
+    @property
+    def text(self) -> str:
+        """Media in words, for files of solutions."""
+        film = f", film of {self.film[0]:g}, {self.film[1]:g} nm" if self.film else ""
+        coat = f" under a coat of index {self.coat:g}" if self.coat else ""
+        return f"{self.material}{film}{coat}{', single' if self.once else ''}"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A surface in a light."""
+
+    surface: Surface
+    light: Light
+    media: Media
+
+    @cached_property
+    def wi(self) -> Real:
+        """Unit vector to the light, (3,)."""
+        return direction(self.light.theta, self.light.phi)
+
+    @property
+    def index(self) -> complex | None:
+        """Index n + ik of the material; none of a perfect conductor."""
+        perfect = self.media.material == "perfect"
+        return None if perfect else index_of(self.media.material, self.light.wavelength)
+
+    @cached_property
+    def orders(self) -> Whole:
+        """Reflected orders across the grooves (n, 2), in light across them."""
+        orders, _ = order_sines(self.field.extent[0], self.light.wavelength, self.light.theta)
+        return np.stack([orders, np.zeros_like(orders)], axis=1)
+
+    @property
+    def field(self) -> HeightField:
+        """Heights of one period."""
+        return self.surface.field
+
+    def wo(self, order: Whole) -> Real:
+        """Directions (n, 3) of orders (n, 2), below the surface if they go through."""
+        step = self.light.wavelength / 1000 / np.array(self.field.extent)
+        tangential = order * step - self.wi[:2]
+        if self.media.through:
+            assert self.index is not None
+            tangential /= self.index.real
+        up = np.sqrt(np.maximum(1 - np.sum(tangential**2, axis=1), 0))
+        return np.column_stack([tangential, -up if self.media.through else up])
+
+    def has(self, **values: Any) -> bool:
+        """Whether surface, light and media have these values, or one of a list of them."""
+        own, missing = self._values, object()
+        return all(
+            own.get(name, missing) in (value if isinstance(value, list) else [value])
+            for name, value in values.items()
+        )
+
+    @cached_property
+    def _values(self) -> dict[str, Any]:
+        surface, media = self.surface, self.media
+        return (
+            {"surface": surface, "grating": surface, "media": media}
+            | {**vars(surface), **vars(media)}
+            | self.light._asdict()
+        )
+
+
+def direction(theta: float, phi: float = 0.0) -> Real:
+    """Return the unit vector (3,) of angles in degrees."""
+    polar, turn = np.radians([theta, phi])
+    sine = np.sin(polar)
+    return np.array([sine * np.cos(turn), sine * np.sin(turn), np.cos(polar)])
+
+
+def in_plane(sine: ArrayLike) -> Real:
+    """Unit vectors (..., 3) in the x–z plane with this x component."""
+    x = np.asarray(sine, np.float64)
+    return np.stack([x, np.zeros_like(x), np.sqrt(np.maximum(1 - x * x, 0))], axis=-1)
+
+
+def grating_cases(material: str) -> list[Case]:
+    """All gratings and lights of one material, in a fixed order.
 
     Raises
     ------
@@ -102,16 +230,18 @@ def scans(material: str) -> list[Scan]:
         raise DiffractionError(
             f"material '{material}' is unknown; choose one of {', '.join(MATERIALS)}"
         )
-    return list(_scans(material))
+    return list(_cases(material))
 
 
-def index_of(material: str, wavelength: float) -> complex:
-    """Index n + ik of a material at a wavelength (nm).
+def index_of(material: str | complex, wavelength: float) -> complex:
+    """Index n + ik of a material, or of a number itself, at a wavelength (nm).
 
     Under polycarbonate both are those inside: the index is over the coat's.
     """
     if material == "aluminium under polycarbonate":
         return index_of("aluminium", wavelength * COAT) / COAT
+    if not isinstance(material, str):
+        return complex(material)
     if material == "keratin":
         return complex(KERATIN)
     nodes = _METALS[material]  # Mitsuba's tables are smooth between them
@@ -125,7 +255,7 @@ def index_text(material: str) -> str:
     return ", ".join(f"{n:g} at {w:g} nm" for w, n in _METALS[material].items())
 
 
-def _scans(material: str) -> Iterator[Scan]:
+def _cases(material: str) -> Iterator[Case]:
     for profile in PROFILES:
         for period in PERIODS:
             for depth in DEPTHS:
@@ -133,7 +263,8 @@ def _scans(material: str) -> Iterator[Scan]:
                 if not _affordable(grating, material):
                     continue
                 for theta in _angles(profile, material):
-                    yield Scan(grating, material, theta, _wavelengths(grating, material, theta))
+                    for wavelength in _wavelengths(grating, material, theta):
+                        yield Case(grating, Light(wavelength, theta), Media(material))
 
 
 def _affordable(grating: Grating, material: str) -> bool:

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import jv
 
 from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, kirchhoff_factor, wavenumber
 from mitsuba_diffraction.tables.lookup import window_sum
 from mitsuba_diffraction.tables.table import DiffractionTable
 
-from .cases import WAVELENGTHS, Grating, order_sines
-from .model import LOBE_SIGMA, in_plane
+from .cases import WAVELENGTHS, Grating, in_plane, order_sines
+from .model import LOBE_SIGMA
 
 #: Angles of incidence, and the largest angle of an order, degrees.
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
@@ -22,7 +23,7 @@ ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
 TABLE_TOLERANCE = 3e-5
 
 
-def order_power(grating: Grating, order: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
+def order_power(grating: Grating, order: ArrayLike, kappa: ArrayLike) -> Real:
     """|a_m|² of the ideal grating (Goodman, Introduction to Fourier Optics, section 4.4).
 
     With φ = κ·depth: J_m²(φ/2) for a sinusoid; for a lamellar grating, half high, cos²(φ/2) at

@@ -8,14 +8,13 @@ for TM on a metallic staircase it does not, so that is not asked of it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from mitsuba_diffraction.streams import own_program, without_chatter
 
-from .cases import Scan, index_of, order_sines
-from .solutions import Efficiencies, imported, version
+from .cases import FEW_WAVELENGTHS, Case, Grating
+from .solutions import LIGHTS, Orders, imported, version
 
 #: (highest Fourier order, layers of the staircase): first and finally.
 STAIRCASE = ((12, 40), (24, 80))
@@ -28,35 +27,34 @@ def name() -> str:
     return f"pySCATMECH {version('pySCATMECH')}, coupled waves"
 
 
-def can_solve(scan: Scan, polarisation: str) -> bool:
+def can_solve(case: Case, polarisation: str) -> bool:
     """Whether coupled waves converge for this ("te" or "tm")."""
-    if scan.material == "keratin":
+    if case.media.material == "keratin":
         return True
-    staircase = scan.grating.profile != "lamellar"
-    return scan.material == "aluminium" and (polarisation == "te" or not staircase)
+    staircase = not case.has(profile="lamellar")
+    return case.media.material == "aluminium" and (polarisation == "te" or not staircase)
 
 
-def part_of(scans: Sequence[Scan]) -> list[Scan]:
-    """The scans to compare both solvers with: shallow and deep, narrow and wide, one wavelength."""
+def part_of(cases: Sequence[Case]) -> list[Case]:
+    """The cases to compare both solvers with: shallow and deep, narrow and wide, one wavelength."""
     return [
-        replace(scan, wavelengths=scan.wavelengths[-1:])
-        for scan in scans
-        if scan.grating.period in (1.1, 2.5) and scan.grating.depth in (0.1, 0.4)
+        case
+        for case in cases
+        if case.has(wavelength=FEW_WAVELENGTHS[-1], period=[1.1, 2.5], depth=[0.1, 0.4])
     ]
 
 
-def resolutions(scan: Scan) -> tuple[tuple[int, int], tuple[int, int]]:
+def resolutions(case: Case) -> tuple[tuple[int, int], tuple[int, int]]:
     """Resolutions to solve with, first and finally."""
-    return LAMELLAR if scan.grating.profile == "lamellar" else STAIRCASE
+    return LAMELLAR if case.has(profile="lamellar") else STAIRCASE
 
 
-def solve(scan: Scan, resolution: tuple[int, int]) -> Efficiencies:
-    """Efficiencies of every order at each wavelength of a scan, by polarisation; NaN where
-    coupled waves do not converge.
+def solve(case: Case, resolution: tuple[int, int]) -> Orders:
+    """Efficiencies of every order of a grating in light across the grooves.
 
     Parameters
     ----------
-    scan : of a material with an index.
+    case : of a material with an index.
     resolution : of `resolutions`: highest Fourier order, and layers.
 
     Raises
@@ -65,29 +63,27 @@ def solve(scan: Scan, resolution: tuple[int, int]) -> Efficiencies:
         If pySCATMECH is not installed.
     """
     model_of = imported("pySCATMECH.rcw").RCW_Model
-    result = Efficiencies(len(scan.wavelengths))
-    for wavelength in scan.wavelengths:
-        orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
-        with own_program(), without_chatter():  # it reports every layer
-            model = model_of(_parameters(scan, wavelength, resolution))
-            matrices = np.array([np.array(model.DiffractionEfficiency(int(m))) for m in orders])
-        # Mueller matrices: with grooves across the plane of incidence, s is TE
-        for polarisation, sign in (("te", 1), ("tm", -1)):
-            values = matrices[:, 0, 0] + sign * matrices[:, 0, 1]
-            usable = can_solve(scan, polarisation)
-            result.orders[polarisation].append(values if usable else np.full(len(orders), np.nan))
-    return result
+    with own_program(), without_chatter():  # it reports every layer
+        model = model_of(_parameters(case, resolution))
+        matrices = np.array(
+            [np.array(model.DiffractionEfficiency(int(m))) for m in case.orders[:, 0]]
+        )
+    # Mueller matrices: with grooves across the plane of incidence, s is TE
+    powers = np.stack([matrices[:, 0, 0] + sign * matrices[:, 0, 1] for sign in (1, -1)], axis=1)
+    usable = [can_solve(case, polarisation) for polarisation in LIGHTS]
+    return Orders(case.orders, np.where(usable, powers, np.nan))
 
 
-def _parameters(scan: Scan, wavelength: float, resolution: tuple[int, int]) -> dict[str, object]:
-    index = index_of(scan.material, wavelength)
+def _parameters(case: Case, resolution: tuple[int, int]) -> dict[str, object]:
+    index, grating, (order, layers) = case.index, case.surface, resolution
+    assert isinstance(grating, Grating)
+    assert index is not None
     material = f"({index.real:.12g},{index.imag:.12g})"
-    grating, (order, layers) = scan.grating, resolution
     common: dict[str, object] = {
         "order": order,
         "type": 0,  # reflection
-        "lambda": wavelength / 1000,
-        "thetai": scan.theta,
+        "lambda": case.light.wavelength / 1000,
+        "thetai": case.light.theta,
         "grating": _KINDS[grating.profile],
         "grating.period": grating.period,
         "grating.medium_i": "(1,0)",

@@ -9,16 +9,16 @@ the square of the layers' thickness; and the harmonics are those nearest to the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.reference import boundary
 
-from .solutions import imported, version
+from .cases import Case
+from .solutions import Orders, imported, version
 
 #: Orders closer to the horizon than this cosine are not returned.
 HORIZON = 0.01
@@ -26,45 +26,23 @@ HORIZON = 0.01
 _TRAVELLING = 1e-6
 
 
-@dataclass(frozen=True)
-class Orders:
-    """Reflected orders of a cell.
-
-    Attributes
-    ----------
-    order : (n, 2) numbers (mx, my).
-    wo : (n, 3) directions.
-    jones : (n, 2, 2) amplitudes about `boundary.polarisation_axes`, phases from height 0.
-    """
-
-    order: NDArray[np.int64]
-    wo: NDArray[np.float64]
-    jones: NDArray[np.complex128]
-
-
 def name() -> str:
     """The solver's name and version."""
     return f"grcwa {version('grcwa')}, coupled waves"
 
 
-def solve(
-    field: HeightField,
-    index: complex,
-    wavelength: float,
-    wi: NDArray[np.float64],
-    harmonics: int,
-    layers: int,
-) -> Orders:
+def resolutions(case: Case) -> tuple[tuple[int, int], ...]:
+    """Numbers of spatial frequencies that the field is expanded in, and layers of the heights."""
+    return ((101, 8), (165, 14)) if is_crossed(case.field) else ((41, 12), (61, 24))
+
+
+def solve(case: Case, resolution: tuple[int, int]) -> Orders:
     """Amplitudes of every reflected order.
 
     Parameters
     ----------
-    field : the cell; where all rows are the same, a grating along x.
-    index : n + ik of the material under vacuum.
-    wavelength : nm.
-    wi : (3,) unit vector to the light.
-    harmonics : how many spatial frequencies the field is expanded in.
-    layers : that the heights are cut into.
+    case : where all rows of the heights are the same, a grating along x.
+    resolution : as `resolutions`.
 
     Raises
     ------
@@ -72,17 +50,18 @@ def solve(
         If grcwa is not installed.
     """
     grcwa = imported("grcwa")
-    lam = wavelength / 1000
+    (harmonics, layers), field, lam = resolution, case.field, case.light.wavelength / 1000
+    assert case.index is not None
     width, height = field.extent
     # grcwa's z points along the light: its frame is ours turned about x by half a turn
-    along = -wi * _TURNED
+    along = -case.wi * _TURNED
     chosen = lowest_orders(along, lam, (width, height), is_crossed(field), harmonics)
     grcwa.rcwa.SolveLayerEigensystem = _eigenmodes
     grcwa.rcwa.Lattice_getG = lambda *_, **__: (chosen, len(chosen))
     polar, azimuth = np.arccos(along[2]), np.arctan2(along[1], along[0])
     cell = grcwa.obj(harmonics, [width, 0], [0, height], 1 / lam, polar, azimuth, verbose=0)
-    _stack(cell, field, index**2, layers)
-    return _amplitudes(cell, chosen, wi, lam, float(field.heights.max()))
+    _stack(cell, field, case.index**2, layers)
+    return _amplitudes(cell, chosen, case, float(field.heights.max()))
 
 
 def is_crossed(field: HeightField) -> bool:
@@ -95,12 +74,12 @@ _TURNED = np.array([1.0, -1.0, -1.0])
 
 
 def lowest_orders(
-    along: NDArray[np.float64],
+    along: Real,
     lam: float,
     extent: tuple[float, float],
     crossed: bool,
     count: int,
-) -> NDArray[np.int64]:
+) -> Whole:
     """Order numbers (count, 2) of the lowest spatial frequencies of the field, light's included."""
     reach = np.arange(-count, count + 1) if not crossed else np.arange(-40, 41)
     mx, my = np.meshgrid(reach, reach if crossed else [0], indexing="ij")
@@ -125,13 +104,11 @@ def _stack(cell: Any, field: HeightField, epsilon: complex, layers: int) -> None
     cell.GridLayer_geteps([mean, mean, 1 / (1 - filled + filled / epsilon)])
 
 
-def _amplitudes(
-    cell: Any, orders: NDArray[np.int64], wi: NDArray[np.float64], lam: float, top: float
-) -> Orders:
+def _amplitudes(cell: Any, orders: Whole, case: Case, top: float) -> Orders:
     """Reflected fields of light polarised along s and p, from the stack's scattering matrix."""
     from grcwa.rcwa import GetSMatrix
 
-    omega, count = cell.omega.real, cell.nG
+    wi, omega, count = case.wi, cell.omega.real, cell.nG
     kx, ky = np.real(cell.kx), np.real(cell.ky)
     up = np.sqrt(np.maximum(omega**2 - kx**2 - ky**2, 0)) / omega
     propagating = up > HORIZON
@@ -159,12 +136,11 @@ def _amplitudes(
     turned = jones @ boundary.turn(basis, s_in, -wi)
     # the solver's phases are those at the highest point
     phase = np.exp(-1j * omega * (wi[2] + wo[:, 2]) * top)
-    return Orders(orders[propagating] * [1, -1], wo, phase[:, None, None] * turned)
+    order = orders[propagating] * [1, -1]
+    return Orders.of_amplitudes(case, order, phase[:, None, None] * turned)
 
 
-def _eigenmodes(
-    omega: Any, kx: Any, ky: Any, kp: Any, epsilon: Any
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _eigenmodes(omega: Any, kx: Any, ky: Any, kp: Any, epsilon: Any) -> tuple[Complex, Complex]:
     """Modes of a layer; grcwa's own takes a travelling mode whose Im q is −1e-17 for a returning
     one, which makes its scattering matrices singular."""
     k = np.vstack((np.diag(kx), np.diag(ky)))

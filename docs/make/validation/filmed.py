@@ -13,56 +13,32 @@ of a wave (α_m, β) at the face z(x). Time exp(−iωt), lengths over 2π/λ.
 
 from __future__ import annotations
 
-import itertools
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Complex, Real
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.reference.fresnel import decaying_root
 
-from .cases import FEW_WAVELENGTHS, Grating, index_of, index_text, order_sines
-from .compare import Comparison, compare, table_of
-from .models import of_colours
-from .solutions import Solutions, Work, order_rows, stored
+from .cases import FEW_WAVELENGTHS, Case, Grating, Light, Media
+from .compare import compare, table_of
+from .models import ANGLES, of_colours
+from .solutions import Orders, Solutions, Solved, stored
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Stack:
-    """A film on a material of `cases.index_of`; thickness in nm."""
-
-    name: str
-    material: str
-    film: complex
-    thickness: float
-
-    @property
-    def file(self) -> str:
-        """Name of the file of solutions, without its suffix."""
-        return f"film_{self.name.replace(' ', '_')}"
-
-
-STACKS = (
-    Stack("wax on keratin", "keratin", 1.44, 150.0),
-    Stack("titania on keratin", "keratin", 2.4, 100.0),
-    Stack("oxide on silicon", "silicon", 1.46, 300.0),
-    Stack("oxide on aluminium", "aluminium", 1.77, 250.0),
-    Stack("lacquer on aluminium", "aluminium", 1.5 + 0.02j, 700.0),
-)
+#: Films on materials, by name.
+FILMS = {
+    "wax on keratin": Media("keratin", (1.44, 150.0)),
+    "titania on keratin": Media("keratin", (2.4, 100.0)),
+    "oxide on silicon": Media("silicon", (1.46, 300.0)),
+    "oxide on aluminium": Media("aluminium", (1.77, 250.0)),
+    "lacquer on aluminium": Media("aluminium", (1.5 + 0.02j, 700.0)),
+}
 #: Steepest slopes of 0.03, 0.06, 0.1 and 0.1: of two, narrow and wide.
 GRATINGS = tuple(
     Grating("sinusoidal", *lengths)
     for lengths in ((2.5, 0.025), (2.5, 0.05), (2.5, 0.08), (1.1, 0.035))
 )
-ANGLES = (0.0, 30.0, 60.0)
-#: Highest order of the expansion: first and finally.
-_HARMONICS = (14, 18)
-_PIXELS = 256
 
 
 def name() -> str:
@@ -70,29 +46,31 @@ def name() -> str:
     return "Rayleigh's expansion at both faces (docs/make/validation/filmed.py)"
 
 
-def solve(grating: Grating, stack: Stack, theta: float, wavelength: float, harmonics: int) -> Real:
-    """Efficiencies of the orders of `cases.order_sines`, (2, orders): TE and TM."""
-    orders, _ = order_sines(grating.period, wavelength, theta)
-    amplitudes, above = _amplitudes(
-        grating, stack, np.sin(np.radians(theta)), wavelength, harmonics
-    )
-    power = np.abs(amplitudes) ** 2 * above.real / above[harmonics].real
-    return np.asarray(power[:, orders + harmonics])
+def file_of(film: str) -> str:
+    """Name of the file of a film's solutions, without its suffix."""
+    return f"film_{film.replace(' ', '_')}"
 
 
-def _amplitudes(
-    grating: Grating, stack: Stack, sine: float, wavelength: float, harmonics: int
-) -> tuple[Complex, Complex]:
-    """Return the amplitudes of all orders, (2, n), and their q above."""
+def resolutions(case: Case) -> tuple[int, int]:
+    """Highest orders of the expansion: first and finally."""
+    return 14, 18
+
+
+def solve(case: Case, harmonics: int) -> Orders:
+    """Efficiencies of every order of a grating in light across the grooves."""
+    grating, wavelength = case.surface, case.light.wavelength
+    assert isinstance(grating, Grating)
+    assert case.media.film is not None
+    assert case.index is not None
+    film, thickness = case.media.film
     m = np.arange(-harmonics, harmonics + 1)
-    alpha = m * wavelength / 1000 / grating.period - sine
-    epsilons = 1.0, stack.film**2, index_of(stack.material, wavelength) ** 2
+    alpha = m * wavelength / 1000 / grating.period - case.wi[0]
+    epsilons = 1.0, film**2, case.index**2
     above, within, below = (decaying_root(e - alpha**2 + 0j) for e in epsilons)
-    heights = grating.heights(_PIXELS).heights[0] * float(wavenumber(wavelength))
+    heights = grating.field.heights[0] * float(wavenumber(wavelength))
     heights = heights - heights.mean()
-    depth = 2 * np.pi * stack.thickness / wavelength
-    through = np.exp(1j * within * depth)
-    amplitudes = []
+    through = np.exp(1j * within * (2 * np.pi * thickness / wavelength))
+    powers = []
     for eta in ((1.0, 1.0, 1.0), epsilons):
         outer, into, rising, falling, under = (
             _projected(heights, alpha, beta, eta[medium])
@@ -105,8 +83,9 @@ def _amplitudes(
         came = np.zeros(2 * len(outer), complex)
         came[: len(outer)] = -into[:, harmonics]
         scale = np.abs(matrix).max(axis=0)
-        amplitudes.append((np.linalg.solve(matrix / scale, came) / scale)[: len(m)])
-    return np.asarray(amplitudes), above
+        amplitudes = (np.linalg.solve(matrix / scale, came) / scale)[: len(m)]
+        powers.append(np.abs(amplitudes) ** 2 * above.real / above[harmonics].real)
+    return Orders(case.orders, np.stack(powers, axis=1)[case.orders[:, 0] + harmonics])
 
 
 def _projected(heights: Real, alpha: Real, beta: Complex, eta: complex) -> Complex:
@@ -123,49 +102,22 @@ def _projected(heights: Real, alpha: Real, beta: Complex, eta: complex) -> Compl
     return np.concatenate(rows)
 
 
-def work() -> Work:
-    """Return all `STACKS` on all `GRATINGS`."""
-    about = {
-        stack.file: {
-            "solver": name(),
-            "material": f"{stack.name}, film of {stack.film:g}, {stack.thickness:g} nm",
-            "index": index_text(stack.material),
-        }
-        for stack in STACKS
-    }
-    cases = list(itertools.product(STACKS, GRATINGS, ANGLES, FEW_WAVELENGTHS))
-    return Work(cases, _by_file, about)
-
-
-def _by_file(case: tuple[Stack, Grating, float, float]) -> dict[str, NDArray[np.void]]:
-    return {case[0].file: _rows(*case)}
-
-
-def _rows(stack: Stack, grating: Grating, theta: float, wavelength: float) -> NDArray[np.void]:
-    both = (solve(grating, stack, theta, wavelength, n) for n in _HARMONICS)
-    return order_rows(grating, theta, wavelength, *both)
-
-
-def deviations(stack: Stack, model: str) -> Real:
-    """Deviations of colours from the stored solutions of a film, (gratings, angles)."""
-    return table_of(_compared(stack, stored(stack.file), model), GRATINGS, ANGLES, of_colours)
-
-
-def _compared(stack: Stack, solutions: Solutions, model: str) -> Comparison:
-    return compare(stack.material, solutions, model, film=(stack.film, stack.thickness))
-
-
 class FilmDeviations(NamedTuple):
     """Deviations of colours under a film by both models, each (gratings, angles)."""
 
-    stack: Stack
+    name: str
+    media: Media
     kirchhoff: Real
     default: Real
 
 
-def of_stack(stack: Stack) -> FilmDeviations:
-    """Compare both models with the stored solutions of a film."""
-    return FilmDeviations(stack, deviations(stack, "kirchhoff"), deviations(stack, "small_slope"))
+def deviations(film: str) -> FilmDeviations:
+    """Compare both models with the stored solutions of one of `FILMS`."""
+    media = FILMS[film]
+    solved = stored(file_of(film), media)
+    by_model = (compare(solved, model) for model in ("kirchhoff", "small_slope"))
+    tables = (table_of(part, GRATINGS, ANGLES, of_colours) for part in by_model)
+    return FilmDeviations(film, media, *tables)
 
 
 class Beyond(NamedTuple):
@@ -178,11 +130,15 @@ class Beyond(NamedTuple):
 
 def beyond() -> list[Beyond]:
     """Compare the model under thicker films and on deeper gratings than those that are stored."""
-    lacquer, theta = STACKS[-1], ANGLES[-1]
     compared = []
     for thickness, depth in ((700.0, 0.12), (1400.0, 0.05), (1400.0, 0.08)):
-        stack, grating = replace(lacquer, thickness=thickness), Grating("sinusoidal", 2.5, depth)
-        rows = np.concatenate([_rows(stack, grating, theta, lam) for lam in FEW_WAVELENGTHS])
-        found = _compared(stack, Solutions(rows, {}), "small_slope")
+        media = Media("aluminium", (1.5 + 0.02j, thickness))
+        solved = []
+        for wavelength in FEW_WAVELENGTHS:
+            light = Light(wavelength, ANGLES[-1])
+            case = Case(Grating("sinusoidal", 2.5, depth), light, media)
+            both = (solve(case, harmonics) for harmonics in resolutions(case))
+            solved.append(Solved.between(case, *both))
+        found = compare(Solutions(solved), "small_slope")
         compared.append(Beyond(thickness, depth, of_colours(found)))
     return compared

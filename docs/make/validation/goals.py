@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from mitsuba_diffraction.arrays import Real
 
 from .cases import PROFILES, Grating
-from .cells import PatchComparison, chosen
-from .compare import Comparison, angles_of, compare, gratings_of
-from .models import ANGLES, BANDS, banded, of_colours, within
+from .compare import Comparison, Sides, angles_of, compare, gratings_of
+from .models import ANGLES, BANDS, banded, of_cells, of_colours, within
+from .solutions import Solutions
 
 #: Largest deviation of colours on keratin at 60°, by profile and band of depth/period.
 KERATIN = {
@@ -24,15 +25,12 @@ KERATIN = {
     ("blazed", BANDS[1]): 0.18,
 }
 
-#: A comparison for each (material, model).
-Sides = Mapping[tuple[str, str], Comparison]
-
 # Enough for a hundredth of a point
 _SHARES = np.linspace(0.0, 1.0, 101)
 
 
 @dataclass(frozen=True)
-class Case:
+class Selection:
     """Deviation of colours at one angle, of a grating or of all gratings of a band.
 
     Attributes
@@ -61,10 +59,7 @@ class Case:
     def with_one_share(self) -> tuple[float, float]:
         """Share of small slope, equal for all orders, with the least deviation, which is second."""
         by_share = [
-            [
-                of_colours(replace(by_model["kirchhoff"], model=model))
-                for model in _by_share(by_model)
-            ]
+            [by_model["kirchhoff"].colours_of(model) for model in _by_share(by_model)]
             for by_model in self.gratings
         ]
         mean = np.mean(by_share, axis=0)
@@ -77,11 +72,11 @@ class Case:
             models, exact = _by_share(by_model), by_model["kirchhoff"].rigorous
             nearest = np.abs(models - exact).argmin(axis=0)
             best = models[nearest, np.arange(len(exact))]
-            deviations.append(of_colours(replace(by_model["kirchhoff"], model=best)))
+            deviations.append(by_model["kirchhoff"].colours_of(best))
         return float(np.mean(deviations))
 
 
-def _by_share(models: Mapping[str, Comparison]) -> NDArray[np.float64]:
+def _by_share(models: Mapping[str, Comparison]) -> Real:
     """Efficiencies (shares, n) by `_SHARES` of small slope in every order.
 
     They are quadratic in the share s, and so given by those at s = 0, 1/2 and 1.
@@ -124,14 +119,13 @@ class Cuts(NamedTuple):
     worst: float
 
 
-def cuts_of_scales(cells: Sequence[PatchComparison], model: str) -> Cuts | None:
+def cuts_of_scales(cells: Sides, model: str) -> Cuts | None:
     """Deviation on cuts of scales of keratin with slope 0.2; None where none are stored."""
-    scales = chosen(cells, ("elaphe", "elaphe_like"), 0.2, "keratin")
-    deviations = [c.by_model[model] for c in scales]
+    deviations = of_cells(cells["keratin", model], kind=["elaphe", "elaphe_like"], slope=0.2)
     return Cuts(float(np.mean(deviations)), max(deviations)) if deviations else None
 
 
-def much_worse(sides: Sides, material: str) -> list[Case]:
+def much_worse(sides: Sides, material: str) -> list[Selection]:
     """Gratings and angles that are worse than Kirchhoff by more than a tenth.
 
     Differences below the last refinement of the solver are left out.
@@ -146,7 +140,7 @@ def much_worse(sides: Sides, material: str) -> list[Case]:
 def with_half(sides: Sides, material: str) -> dict[str, Comparison]:
     """Comparisons of one material by model, and by equal parts of both matrices."""
     models = models_of(sides, material)
-    half = compare(material, models["kirchhoff"].solutions, "half_and_half")
+    half = compare(Solutions(models["kirchhoff"].solved), "half_and_half")
     return {**models, "half_and_half": half}
 
 
@@ -155,7 +149,7 @@ def models_of(sides: Sides, material: str) -> dict[str, Comparison]:
     return {model: part for (name, model), part in sides.items() if name == material}
 
 
-def singles(models: Mapping[str, Comparison]) -> list[Case]:
+def singles(models: Mapping[str, Comparison]) -> list[Selection]:
     """Every grating and angle of one material, from its comparisons by model."""
     every = models["kirchhoff"]
     return [
@@ -166,7 +160,7 @@ def singles(models: Mapping[str, Comparison]) -> list[Case]:
     ]
 
 
-def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Case]:
+def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Selection]:
     """Every profile and band of depth/period at `models.ANGLES`."""
     for profile in PROFILES:
         for low, high in BANDS:
@@ -177,9 +171,9 @@ def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Case]:
 
 def _case(
     models: Mapping[str, Comparison], label: str, theta: float, gratings: Sequence[Grating]
-) -> Case:
+) -> Selection:
     parts = [
         {name: every.where(grating=grating, theta=theta) for name, every in models.items()}
         for grating in gratings
     ]
-    return Case(label, theta, parts)
+    return Selection(label, theta, parts)

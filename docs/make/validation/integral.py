@@ -12,8 +12,8 @@ from unittest import mock
 
 import numpy as np
 
-from .cases import Grating, Scan, index_of, order_sines
-from .solutions import LIGHTS, Efficiencies, imported, version
+from .cases import FEW_WAVELENGTHS, WAVELENGTHS, Case, Grating, index_of
+from .solutions import LIGHTS, Orders, imported, version
 
 #: Points on the boundary that a solution begins with, at least.
 POINTS = 200
@@ -28,12 +28,11 @@ def name() -> str:
     return f"gratinglab {version('gratinglab')}, integral method"
 
 
-def solve(scan: Scan, boundary_points: int) -> Efficiencies:
-    """Efficiencies of every order at each wavelength of a scan, by polarisation.
+def solve(case: Case, boundary_points: int) -> Orders:
+    """Efficiencies of every order of a grating in light across the grooves.
 
     Parameters
     ----------
-    scan : what to solve.
     boundary_points : nodes on one period of the boundary, see `resolutions`.
 
     Raises
@@ -43,25 +42,25 @@ def solve(scan: Scan, boundary_points: int) -> Efficiencies:
     """
     illumination = imported("gratinglab.illumination").Illumination
     integral = imported("gratinglab.solvers.integral").integral
+    grating, wavelength = case.surface, case.light.wavelength
+    assert isinstance(grating, Grating)
     options: dict[str, Any] = {
         "boundary_points": boundary_points,
-        "corner_grading": 0 if scan.grating.profile == "sinusoidal" else _GRADING,
+        "corner_grading": 0 if grating.profile == "sinusoidal" else _GRADING,
     }
-    result = Efficiencies(len(scan.wavelengths))
-    with _material(scan) as coating:
+    powers, balance = [], []
+    with _material(case) as coating:
         if coating:
             options["conductivity"] = "tabulated"
-        problem = _problem(scan.grating, coating)
+        problem = _problem(grating, coating)
         for polarisation in LIGHTS:
-            light = illumination.classical(scan.theta, polarisation.upper())
-            efficiencies = integral.solve(problem, light, scan.wavelengths, **options)
-            for n, wavelength in enumerate(scan.wavelengths):
-                orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
-                columns = np.searchsorted(efficiencies.orders, orders)
-                result.orders[polarisation].append(efficiencies.efficiency[n, columns])
-                absorbed = 0.0 if efficiencies.absorption is None else efficiencies.absorption[n]
-                result.balance[polarisation][n] = efficiencies.efficiency[n].sum() + absorbed - 1.0
-    return result
+            light = illumination.classical(case.light.theta, polarisation.upper())
+            found = integral.solve(problem, light, (wavelength,), **options)
+            columns = np.searchsorted(found.orders, case.orders[:, 0])
+            powers.append(found.efficiency[0, columns])
+            absorbed = 0.0 if found.absorption is None else found.absorption[0]
+            balance.append(found.efficiency[0].sum() + absorbed - 1.0)
+    return Orders(case.orders, np.stack(powers, axis=1), balance)
 
 
 def _problem(grating: Grating, coating: str | None) -> Any:
@@ -79,44 +78,46 @@ def _problem(grating: Grating, coating: str | None) -> Any:
     return Problem(period=1000 * grating.period, profile=profile, coating=coating)
 
 
-def resolutions(scan: Scan) -> tuple[int, int, int]:
+def resolutions(case: Case) -> tuple[int, int, int]:
     """Points on the boundary: at first, then, and where that is not enough.
 
     The first is as many as the shortest wavelength on either side of the boundary takes, at least
     `POINTS`; the second is twice as many, or 1.4 times where that would be above 800, since the
     time grows with the third power; the third twice as many again.
     """
-    arc = scan.grating.period + 2 * scan.grating.depth
-    perfect = scan.material == "perfect"
+    grating, material = case.surface, case.media.material
+    assert isinstance(grating, Grating)
+    arc = grating.period + 2 * grating.depth
+    perfect = material == "perfect"
+    # all wavelengths of a material have the mesh of the shortest
+    wavelengths = {case.light.wavelength, *(WAVELENGTHS if perfect else FEW_WAVELENGTHS)}
     in_material = [
-        w / 1000 / (1.0 if perfect else max(1.0, abs(index_of(scan.material, w))))
-        for w in scan.wavelengths
+        w / 1000 / (1.0 if perfect else max(1.0, abs(index_of(material, w)))) for w in wavelengths
     ]
     # a graded mesh is twice as coarse in the middle of a side
-    graded = 1 if scan.grating.profile == "sinusoidal" else 2
+    graded = 1 if grating.profile == "sinusoidal" else 2
     first = max(POINTS, int(np.ceil(_POINTS_PER_WAVELENGTH * graded * arc / min(in_material))))
     second = 2 * first if 2 * first <= 800 else int(np.ceil(1.4 * first))
     return first, second, 2 * second
 
 
 @contextmanager
-def _material(scan: Scan) -> Iterator[str | None]:
+def _material(case: Case) -> Iterator[str | None]:
     """A library of one material while solving: gratinglab reads the index from a file by name."""
-    if scan.material == "perfect":
+    if case.index is None:
         yield None
         return
     from gratinglab import materials
 
-    wavelengths = np.array(sorted(scan.wavelengths))
-    index = np.array([index_of(scan.material, w) for w in wavelengths])
+    name, wavelength = case.media.material, case.light.wavelength
     # a table's ends are rounded
     table = materials.OpticalConstants(
-        scan.material,
-        np.concatenate([[wavelengths[0] - 1], wavelengths, [wavelengths[-1] + 1]]),
-        1 - np.pad(index.real, 1, mode="edge"),
-        np.pad(index.imag, 1, mode="edge"),
+        name,
+        wavelength + np.arange(-1.0, 2.0),
+        np.full(3, 1 - case.index.real),
+        np.full(3, case.index.imag),
     )
     with tempfile.TemporaryDirectory() as folder:
-        materials.write_ari(table, Path(folder) / f"{scan.material}.ari")
+        materials.write_ari(table, Path(folder) / f"{name}.ari")
         with mock.patch.dict(os.environ, {materials.LIBRARY_ENV: folder}):
-            yield scan.material
+            yield name

@@ -1,30 +1,29 @@
-"""Light on a grating, and its orders by a solver of the package; heights of a profile."""
+"""Light as the package's solvers have it, and orders by these; heights of a profile."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve.profiles import Profile
 from mitsuba_diffraction.orders.solve.stations import Grating, Solver, Station
 
-from .cases import PIXELS
+from .cases import PIXELS, Case
+from .solutions import Orders
 
-Real = NDArray[np.float64]
 
-
-class Light(NamedTuple):
+class Beam(NamedTuple):
     """Station of some light, and the channel of its mirror direction."""
 
     station: Station
     channel: int
 
 
-def light_of(period: float, wavelength: float, index: complex, x: float, y: float) -> Light:
+def light_of(period: float, wavelength: float, index: complex, x: float, y: float) -> Beam:
     """Return light of one wavelength (µm) whose mirror direction has the cosines x and y."""
     c = np.sqrt(1.0 - y * y)
     extent = 2.0 * c * period / wavelength
@@ -32,10 +31,10 @@ def light_of(period: float, wavelength: float, index: complex, x: float, y: floa
     fraction = place % 1.0
     channels = int(np.floor(extent - fraction)) + 1
     arrays = np.array([wavelength]), np.array([index]), np.array([abs(y)])
-    return Light(Station(extent, fraction, channels, *arrays), int(place))
+    return Beam(Station(extent, fraction, channels, *arrays), int(place))
 
 
-def light_on(grating: Grating, x: float, y: float, wavelength: float) -> Light:
+def light_on(grating: Grating, x: float, y: float, wavelength: float) -> Beam:
     """Return light of one wavelength (nm) as a table's solver has it; x and y as `light_of`."""
     period, limits = grating.optical_period, grating.wavelengths
     cell = cells.to_cell(x, y, wavelength, period)
@@ -43,21 +42,23 @@ def light_on(grating: Grating, x: float, y: float, wavelength: float) -> Light:
     if limits[0] < limits[1]:
         w = float(cells.w_of(cell.k_continuous, wavelength, limits, period))
     place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho)
-    return Light(grating.station(*place, [w]), int(cell.channel))
+    return Beam(grating.station(*place, [w]), int(cell.channel))
 
 
-def powers_of(solver: Solver, light: Light) -> dict[int, Real]:
+def powers_of(solver: Solver, light: Beam) -> dict[int, Real]:
     """Return the efficiencies (2,) of all orders, for s and p light across the grooves."""
     amplitudes = solver.amplitudes(light.station)[0, light.channel]
     powers = (np.abs(amplitudes) ** 2).sum(axis=-1)
     return {light.channel - q: powers[:, q] for q in range(powers.shape[1])}
 
 
-def direction(theta: float, phi: float = 0.0) -> Real:
-    """Return the unit vector (3,) of angles in degrees."""
-    polar, turn = np.radians([theta, phi])
-    sine = np.sin(polar)
-    return np.array([sine * np.cos(turn), sine * np.sin(turn), np.cos(polar)])
+def solved_by(solver: Solver, case: Case) -> Orders:
+    """Return the reflected orders of a case by a solver of the package."""
+    assert case.index is not None
+    (x, y, _), period = case.wi, case.field.extent[0]
+    powers = powers_of(solver, light_of(period, 1e-3 * case.light.wavelength, case.index, -x, y))
+    order = np.array([(m, 0) for m in sorted(powers)])
+    return Orders(order, np.array([powers[m] for m, _ in order]))
 
 
 def heights_of(profile: Profile, pixels: int = PIXELS, rows: int = 2) -> HeightField:

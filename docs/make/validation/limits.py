@@ -22,11 +22,6 @@ STEEP_ERROR = 0.2
 STEEPEST_LIGHT = 60.0
 
 
-def rms_slope(grating: Grating) -> float:
-    """RMS slope of the sampled grating."""
-    return grating.heights().rms_slope
-
-
 def worst_deviations(comparisons: Sequence[Comparison]) -> list[tuple[Grating, float, float]]:
     """Each material's sinusoids with slope and largest deviation of colours, gentlest first."""
     deviations = []
@@ -35,7 +30,7 @@ def worst_deviations(comparisons: Sequence[Comparison]) -> list[tuple[Grating, f
         angles = [theta for theta in angles_of(comparison) if 0 <= theta <= STEEPEST_LIGHT]
         table = table_of(comparison, sinusoids, angles, of_colours).max(axis=1)
         deviations += [
-            (grating, rms_slope(grating), float(worst))
+            (grating, grating.field.rms_slope, float(worst))
             for grating, worst in zip(sinusoids, table, strict=True)
         ]
     return sorted(deviations, key=lambda item: item[1])

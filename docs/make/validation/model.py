@@ -1,4 +1,4 @@
-"""Efficiencies of a grating's orders by the package, from its BRDF.
+"""Efficiencies of the orders of a periodic surface by the package, from its BRDF.
 
 Through a window much wider than the period every order is a narrow lobe of the BRDF,
 
@@ -15,19 +15,19 @@ R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffractio
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.optics import blend
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.reference import boundary
 from mitsuba_diffraction.reference import model as models
+from mitsuba_diffraction.reference.fresnel import amplitudes
 
-from .cases import Grating, index_of, order_sines
+from .cases import Case, in_plane, index_of
 
 #: σ (µm) of a window through which the lobes of gratings are separate, up to periods of 1 mm, and
 #: order 0's lies above the horizon: √(kσ) cosθ is above 20 up to 75°, so C of eq. 10 is 1.
@@ -37,44 +37,17 @@ LOBE_SIGMA = 1000.0
 MODELS = (*reference.MODELS, "small_slope_alone", "half_and_half")
 
 
-def order_efficiencies(
-    grating: Grating,
-    material: str,
-    theta: float,
-    wavelength: float,
-    model: str = "kirchhoff",
-    **layer: Any,
-) -> NDArray[np.float64]:
-    """η_m of every propagating order, ordered as `cases.order_sines`, for unpolarised light.
-
-    Parameters
-    ----------
-    grating : in the plane of incidence.
-    material : of `cases.MATERIALS`; a perfect conductor is Kirchhoff's alone.
-    theta : angle of incidence, degrees.
-    wavelength : nm.
-    model : of `MODELS`.
-    layer : `coat` or `film` of `reference.brdf`, for models of `reference.MODELS`.
-    """
-    _, sines = order_sines(grating.period, wavelength, theta)
-    wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
-    index = None if material == "perfect" else index_of(material, wavelength)
-    return efficiencies(
-        _period(grating), index, wi, wo, wavelength, model, sigma=LOBE_SIGMA, **layer
-    )
-
-
 def efficiencies(
     field: HeightField,
     index: complex | None,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
+    wi: Real,
+    wo: Real,
     wavelength: float,
     model: str,
     *,
-    sigma: float,
+    sigma: float = LOBE_SIGMA,
     **layer: Any,
-) -> NDArray[np.float64]:
+) -> Real:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
     Parameters
@@ -83,6 +56,7 @@ def efficiencies(
     wi, wo : (3,) and (n, 3), unit vectors away from the surface.
     model : of `MODELS`.
     sigma : of a window (µm) through which the lobes are separate.
+    layer : `coat` or `film` of `reference.brdf`, for models of `reference.MODELS`.
     """
     width = WIDTHS_PER_SIGMA * sigma
     per_brdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
@@ -106,11 +80,11 @@ def efficiencies(
 def jones_of(
     field: HeightField,
     index: complex,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
+    wi: Real,
+    wo: Real,
     wavelength: float,
     model: str,
-) -> NDArray[np.complex128]:
+) -> Complex:
     """Jones matrices (n, 2, 2) of one of `MODELS`; arguments as `efficiencies`."""
     if model == "kirchhoff":
         return models.kirchhoff(wi, wo, index)
@@ -124,10 +98,10 @@ def jones_of(
 def share_of(
     field: HeightField,
     index: complex,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
+    wi: Real,
+    wo: Real,
     wavelength: float,
-) -> NDArray[np.float64]:
+) -> Real:
     """s of small slope in the default, (n,); arguments as `efficiencies`."""
     k, total = float(wavenumber(wavelength)), wi + wo
     roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
@@ -135,30 +109,48 @@ def share_of(
     return np.asarray(models.small_slope_weight(k * total[:, 2], variance, index))
 
 
-@cache
-def _period(grating: Grating) -> HeightField:
-    return grating.heights()
-
-
-def shares(jones: NDArray[np.complex128]) -> NDArray[np.float64]:
+def shares(jones: Complex) -> Real:
     """Power of incident s and p light after Jones matrices, over the mean of both, (n, 2)."""
     power = np.sum(np.abs(jones) ** 2, axis=1)
     return np.asarray(power / power.mean(axis=1, keepdims=True), np.float64)
 
 
-def order_shares(
-    grating: Grating, material: str, theta: float, wavelength: float, model: str
-) -> NDArray[np.float64]:
-    """`shares` of TE and TM light for every order; arguments as `order_efficiencies`."""
-    _, sines = order_sines(grating.period, wavelength, theta)
-    if material == "perfect":
-        return np.ones((len(sines), 2))
-    index, field = index_of(material, wavelength), grating.heights()
-    wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
-    return shares(jones_of(field, index, wi, wo, wavelength, model))
+def modelled(case: Case, order: Whole, model: str) -> Real:
+    """Efficiencies (n, 2) of orders (n, 2) of a case, for s and p light.
+
+    Both are the mean for unpolarised light of a perfect conductor, under layers, and of light that
+    goes through.
+
+    Parameters
+    ----------
+    model : of `MODELS`; of `reference.MODELS` under layers and for light that goes through.
+    """
+    media, wavelength, index = case.media, case.light.wavelength, case.index
+    wi, wo = case.wi, case.wo(order)
+    if media.once:
+        return _diffracted_once(case, wi, wo, model)
+    light = case.field, index, wi, wo, wavelength, model
+    if media.through:
+        assert index is not None
+        btdf = reference.btdf(
+            case.field, wi, wo, wavelength,
+            eta=index.real, coherence_width=WIDTHS_PER_SIGMA * LOBE_SIGMA, model=model,
+        )  # fmt: skip
+        mean = np.pi / (LOBE_SIGMA * float(wavenumber(wavelength))) ** 2 * btdf
+    else:
+        mean = efficiencies(*light, **media.layer)
+    if index is None or media.layer or media.through:
+        return np.repeat(mean[:, None], 2, axis=1)
+    return mean[:, None] * shares(jones_of(case.field, index, *light[2:]))
 
 
-def in_plane(sine: ArrayLike) -> NDArray[np.float64]:
-    """Unit vectors (..., 3) in the x–z plane with this x component."""
-    x = np.asarray(sine, np.float64)
-    return np.stack([x, np.zeros_like(x), np.sqrt(np.maximum(1 - x * x, 0))], axis=-1)
+def _diffracted_once(case: Case, wi: Real, wo: Real, model: str) -> Real:
+    """Efficiencies of what is diffracted once under a coat, without what its face reflects."""
+    coat, wavelength = case.media.coat, case.light.wavelength
+    assert coat is not None
+    within = wavelength / coat
+    index = index_of(f"{case.media.material} under polycarbonate", within)
+    inside = case.field, index, in_plane(wi[0] / coat), in_plane(wo[:, 0] / coat), within, model
+    by_light = efficiencies(*inside)[:, None] * shares(jones_of(*inside))
+    there, back = (1 - np.abs(amplitudes(np.atleast_1d(v[..., 2]), coat)) ** 2 for v in (wi, wo))
+    return np.asarray(by_light * (there * back).T)

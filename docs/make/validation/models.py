@@ -1,20 +1,22 @@
-"""Deviations of Kirchhoff, small slope and their blend from rigorous solutions of gratings."""
+"""Deviations of Kirchhoff, small slope and their blend from rigorous solutions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from .cases import PROFILES, Grating
-from .compare import Comparison, compare, gratings_of, table_of
-from .solutions import LIGHTS
+from .compare import Comparison, Sides, compare, gratings_of, table_of
+from .solutions import LIGHTS, Solutions
 
 #: Depth over period of the gratings that are averaged, from above the first to the second.
 BANDS = ((0.0, 0.03), (0.03, 0.08), (0.08, 0.13), (0.13, 0.4))
 ANGLES = (0.0, 30.0, 60.0)
 MATERIALS = ("keratin", "aluminium")
+#: Models that are compared.
+COMPARED = ("kirchhoff", "small_slope_alone", "small_slope")
 
 
 #: Deviation of colours: unpolarised, and with the electric field along the grooves or across.
@@ -48,10 +50,16 @@ def within(comparison: Comparison, profile: str, band: tuple[float, float]) -> l
     ]
 
 
-def compare_all(kirchhoff: dict[str, Comparison]) -> dict[tuple[str, str], Comparison]:
-    """Compare every model with the solutions of Kirchhoff's comparisons, by (material, model)."""
-    by_model = {(material, "kirchhoff"): kirchhoff[material] for material in MATERIALS}
-    for material in MATERIALS:
-        for model in ("small_slope_alone", "small_slope"):
-            by_model[material, model] = compare(material, kirchhoff[material].solutions, model)
-    return by_model
+def compare_all(solutions: Mapping[str, Solutions]) -> Sides:
+    """Compare the models of `COMPARED` with solutions by material."""
+    return {
+        (material, model): compare(solved, model)
+        for material, solved in solutions.items()
+        for model in COMPARED
+    }
+
+
+def of_cells(comparison: Comparison, light: str | None = None, **values: object) -> list[float]:
+    """Deviations of colours of the cases with these values, as `Case.has`."""
+    parts = comparison.where(**values).each()
+    return [part.deviation(colours=True, light=light) for part in parts]

@@ -8,16 +8,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import OrderTable
-from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
@@ -25,18 +24,16 @@ from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 from mitsuba_diffraction.orders.solve.stations import Grating, Solver
 
-from .compare import GRAZING, misplaced
-from .light import Light, heights_of, light_of, light_on, powers_of
-from .model import LOBE_SIGMA, efficiencies
-
-Real = NDArray[np.float64]
+from .cases import Case, Light, Media, Sampled
+from .compare import Comparison, compare
+from .light import heights_of, light_on, powers_of, solved_by
+from .solutions import Solutions, Solved
 
 FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 #: Tables, and (θ, φ) of the light in degrees: across the grooves, oblique and along them.
 TABLES = ("cd", "dvd", "blazed", "sinusoidal")
 MOUNTS = ((0, 0), (30, 0), (30, 50), (30, 90), (60, 0), (60, 50), (60, 90))
 WAVELENGTHS = (460.0, 530.0, 610.0)
-_HORIZON = np.cos(np.radians(GRAZING))
 #: Harmonics on either side, of coupled waves and of Chandezon's method.
 COUPLED, CHANDEZON = 60, 20
 #: Wavelength of the efficiencies side by side, nm.
@@ -57,18 +54,12 @@ class Deviation(NamedTuple):
 
 
 class Row(NamedTuple):
-    """Efficiencies at one wavelength, (n,) each: orders, cosines, truth, model and table."""
+    """Efficiencies of one order, by the model, the table and the solver beside."""
 
-    order: NDArray[np.int64]
-    cosine: Real
-    truth: Real
-    model: Real
-    table: Real
-
-    @property
-    def coloured(self) -> NDArray[np.bool_]:
-        """Orders but 0 within `GRAZING`."""
-        return (self.order != 0) & (self.cosine > _HORIZON)
+    order: int
+    model: float
+    table: float
+    truth: float
 
 
 class Diffuse(NamedTuple):
@@ -92,7 +83,7 @@ class Diffuse(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Case:
+class Shipped:
     """A shipped table, its recipe, and the grating."""
 
     name: str
@@ -108,33 +99,50 @@ class Case:
         return OrderTable.load(FOLDER / f"{self.name}.nc")
 
     @cached_property
-    def field(self) -> HeightField:
+    def surface(self) -> Sampled:
         """Heights of one period."""
-        return heights_of(self.recipe.profile)
+        return Sampled(heights_of(self.recipe.profile))
 
     def deviations(self, theta: float, phi: float) -> list[Deviation]:
-        """Return the deviations of the default model and of the table.
+        """Return the deviations of the default model and of the table; angles as `compared`."""
+        return [
+            Deviation(
+                part.deviation(colours=True),
+                max(abs(float((one.model - one.rigorous).sum())) for one in part.each()),
+            )
+            for part in self.compared(theta, phi)
+        ]
+
+    def side_by_side(self, theta: float, phi: float) -> list[Row]:
+        """Return order 0 and the strongest other one, at `SHOWN`."""
+        model, table = self.compared(theta, phi, (SHOWN,))
+        truth, order = model.rigorous, model.order[:, 0]
+        # +m and −m of light in the plane of the grooves are equal but for rounding
+        colours = np.where(model.coloured & model.counted, truth.round(6), -1.0)
+        shown = [
+            int(np.flatnonzero(order == 0)[0]),
+            *([colours.argmax()] if colours.max() >= 0 else []),
+        ]
+        return [Row(int(order[n]), model.model[n], table.model[n], truth[n]) for n in shown]
+
+    def compared(
+        self, theta: float, phi: float, wavelengths: Sequence[float] = WAVELENGTHS
+    ) -> tuple[Comparison, Comparison]:
+        """Return the default model and the table beside the other solver.
 
         theta, phi : of the light in air, degrees; a superstrate refracts it.
         """
-        rows = [self._efficiencies(theta, phi, lam) for lam in WAVELENGTHS]
-        coloured = np.concatenate([row.coloured for row in rows])
-        truth = np.concatenate([row.truth for row in rows])
-        return [
-            Deviation(
-                misplaced(np.concatenate(values), truth, coloured),
-                max(abs(float(v.sum() - r.truth.sum())) for v, r in zip(values, rows, strict=True)),
-            )
-            for values in ([row.model for row in rows], [row.table for row in rows])
-        ]
-
-    def side_by_side(self, theta: float, phi: float) -> Row:
-        """Return order 0 and the strongest other one, at `SHOWN`."""
-        row = self._efficiencies(theta, phi, SHOWN)
-        # +m and −m of light in the plane of the grooves are equal but for rounding
-        strongest = int(np.argmax(np.where(row.coloured, row.truth.round(6), -1.0)))
-        shown = [int(np.flatnonzero(row.order == 0)[0]), strongest]
-        return Row(*(column[shown[: 1 + row.coloured[strongest]]] for column in row))
+        superstrate, solved, by_table = self.recipe.superstrate, [], []
+        inside = float(np.degrees(np.arcsin(np.sin(np.radians(theta)) / superstrate)))
+        for wavelength in wavelengths:
+            light = Light(wavelength / superstrate, inside, phi)
+            case = Case(self.surface, light, Media(self._index(wavelength)))
+            found = solved_by(self.solver, case)
+            solved.append(Solved.between(case, found, found))
+            x, y, _ = case.wi
+            values = self.table.efficiency(-x, y, wavelength, found.order[:, 0])
+            by_table.append(np.repeat(values[:, None], 2, axis=1))
+        return compare(Solutions(solved), "small_slope"), Comparison(solved, by_table)
 
     def diffuse(self, samples: int = SAMPLES) -> list[Diffuse]:
         """Return the deviations from the table's own solver, of each kind of light."""
@@ -175,26 +183,13 @@ class Case:
             float(size.max()),
         )
 
-    def _efficiencies(self, theta: float, phi: float, wavelength: float) -> Row:
-        recipe, table = self.recipe, self.table
-        sine, turn = np.sin(np.radians(theta)) / recipe.superstrate, np.radians(phi)
-        wi = np.array([sine * np.cos(turn), sine * np.sin(turn), np.sqrt(1 - sine**2)])
-        truth = self.truth(wi, wavelength)
-        inside = wavelength / recipe.superstrate
-        order = np.array(sorted(truth))
-        x = order * inside / 1e3 / table.period - wi[0]
-        wo = np.stack([x, np.full(len(x), -wi[1]), np.sqrt(1 - x**2 - wi[1] ** 2)], axis=-1)
-        index = self._index(wavelength)
-        model = efficiencies(self.field, index, wi, wo, inside, "small_slope", sigma=LOBE_SIGMA)
-        solved = table.efficiency(-wi[0], wi[1], wavelength, order)
-        return Row(order, wo[:, 2], np.array([truth[m] for m in order]), model, solved)
-
     def _by_solver(self, solver: Solver, x: float, y: float, lam: float) -> dict[int, float]:
         """Return the efficiencies of all orders by the table's solver."""
         recipe, alone = self.recipe, (lam, lam)
         material = material_of(recipe.material, alone)
         grating = Grating(recipe.profile, material, recipe.superstrate, alone)
-        return _unpolarised(solver, light_on(grating, x, y, lam))
+        powers = powers_of(solver, light_on(grating, x, y, lam))
+        return {m: float(power.mean()) for m, power in powers.items()}
 
     def _index(self, wavelength: float) -> complex:
         """Return the index over that of the superstrate."""
@@ -209,14 +204,3 @@ class Case:
         if self.name in ("cd", "dvd"):
             return CoupledWaves(self.recipe.profile, COUPLED)
         return Chandezon(self.recipe.profile, CHANDEZON)
-
-    def truth(self, wi: Real, wavelength: float) -> dict[int, float]:
-        """Return the efficiencies of all orders by the solver beside, for unpolarised light."""
-        inside = 1e-3 * wavelength / self.recipe.superstrate
-        light = light_of(self.table.period, inside, self._index(wavelength), -wi[0], wi[1])
-        return _unpolarised(self.solver, light)
-
-
-def _unpolarised(solver: Solver, light: Light) -> dict[int, float]:
-    """Return the efficiencies of all orders."""
-    return {m: float(power.mean()) for m, power in powers_of(solver, light).items()}

@@ -1,4 +1,4 @@
-"""Surfaces in two dimensions, for comparisons with rigorous solutions.
+"""Surfaces in two dimensions, for comparisons with rigorous solutions, and their lights.
 
     python -m docs.make.validation.patches FILE    # cut the measured scale, see data/
 
@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from docs.make.figures.pages import option, program
 from mitsuba_diffraction import HeightField, gratings
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.atomic import atomic_path
 
-from .solutions import DATA
+from .cases import DATA, Case, Light, Media
 
 KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
 #: Cuts of the measured patch; the project does not ship this patch.
@@ -40,8 +40,8 @@ _ROW = 0.01
 
 
 @dataclass(frozen=True)
-class Surface:
-    """Cell that tiles the plane.
+class Cell:
+    """Surface that tiles the plane.
 
     `kind` is one of `KINDS`. `size` is the period or the cut's
     side in µm, `place` its corner in pixels of what it is cut from. `slope` is the RMS of |∇h|,
@@ -55,41 +55,38 @@ class Surface:
     place: tuple[int, int] = (0, 0)
     wavelength: float = 550.0
 
+    @property
+    def field(self) -> HeightField:
+        """Heights, mean 0."""
+        return _field(self)
 
-@dataclass(frozen=True)
-class PatchCase:
-    """A surface of a material in light from (theta, phi), degrees, at one wavelength, nm."""
-
-    surface: Surface
-    material: str
-    wavelength: float
-    theta: float
-    phi: float
+    def __str__(self) -> str:
+        return self.name
 
 
 class Cut(NamedTuple):
     """Heights of a cut and its side, both in µm."""
 
-    heights: NDArray[np.float64]
+    heights: Real
     side: float
 
 
 #: Slopes of the sinusoids are those of 2.5/0.05 and 1.6/0.1 µm.
-SURFACES = {
-    surface.name: surface
-    for surface in (
-        Surface("sinusoid 2.5/0.05 µm", "sinusoid", 2.5, np.pi * 0.05 / 2.5 / np.sqrt(2)),
-        Surface("sinusoid 1.6/0.1 µm", "sinusoid", 1.6, np.pi * 0.1 / 1.6 / np.sqrt(2)),
-        Surface("crossed grating", "crossed", 1.5, 0.1),
-        Surface("Elaphe, cut 1", "elaphe", 2.6, 0.2, (640, 500)),
-        Surface("Elaphe, cut 2", "elaphe", 2.6, 0.2, (900, 850), 460.0),
-        Surface("Elaphe, cut 3", "elaphe", 2.6, 0.2, (200, 1000)),
-        Surface("Elaphe, cut 1, flattened", "elaphe", 2.6, 0.09, (640, 500)),
-        Surface("look-alike of Elaphe", "elaphe_like", 2.6, 0.2, (100, 100)),
-        Surface("CD's pits, flattened", "cd_pits", 3.2, 0.2, (600, 590)),
-        Surface("Elaphe, cut 3, flattened", "elaphe", 2.6, 0.09, (200, 1000)),
-        Surface("look-alike, flattened", "elaphe_like", 2.6, 0.09, (100, 100)),
-        Surface("CD's pits, low", "cd_pits", 3.2, 0.06, (600, 590)),
+CELLS = {
+    cell.name: cell
+    for cell in (
+        Cell("sinusoid 2.5/0.05 µm", "sinusoid", 2.5, np.pi * 0.05 / 2.5 / np.sqrt(2)),
+        Cell("sinusoid 1.6/0.1 µm", "sinusoid", 1.6, np.pi * 0.1 / 1.6 / np.sqrt(2)),
+        Cell("crossed grating", "crossed", 1.5, 0.1),
+        Cell("Elaphe, cut 1", "elaphe", 2.6, 0.2, (640, 500)),
+        Cell("Elaphe, cut 2", "elaphe", 2.6, 0.2, (900, 850), 460.0),
+        Cell("Elaphe, cut 3", "elaphe", 2.6, 0.2, (200, 1000)),
+        Cell("Elaphe, cut 1, flattened", "elaphe", 2.6, 0.09, (640, 500)),
+        Cell("look-alike of Elaphe", "elaphe_like", 2.6, 0.2, (100, 100)),
+        Cell("CD's pits, flattened", "cd_pits", 3.2, 0.2, (600, 590)),
+        Cell("Elaphe, cut 3, flattened", "elaphe", 2.6, 0.09, (200, 1000)),
+        Cell("look-alike, flattened", "elaphe_like", 2.6, 0.09, (100, 100)),
+        Cell("CD's pits, low", "cd_pits", 3.2, 0.06, (600, 590)),
     )
 }
 
@@ -98,47 +95,42 @@ _MANY = ("Elaphe, cut 1", "Elaphe, cut 3")  # the others are for comparison
 _FEW = ((0.0, 0.0), (60.0, 0.0), (60.0, 45.0))
 
 
-def patch_cases(material: str) -> Iterator[PatchCase]:
-    """All cases of a material, in a fixed order."""
-    for surface in SURFACES.values():
-        grating = surface.kind == "sinusoid"
-        if material != "keratin" and not grating and surface.slope > 0.1:
+def cell_cases(material: str) -> Iterator[Case]:
+    """All cells and lights of a material, in a fixed order."""
+    for cell in CELLS.values():
+        grating = cell.kind == "sinusoid"
+        if material != "keratin" and not grating and cell.slope > 0.1:
             continue  # neither solver converges on a metal that is this steep
-        wavelengths = (460.0, 610.0) if surface.name == "Elaphe, cut 1" else (surface.wavelength,)
+        wavelengths = (460.0, 610.0) if cell.name == "Elaphe, cut 1" else (cell.wavelength,)
         for wavelength in wavelengths:
-            many = grating or (material == "keratin" and surface.name in _MANY)
-            for theta, phi in _OBLIQUE if many else _FEW:
-                yield PatchCase(surface, material, wavelength, theta, phi)
+            many = grating or (material == "keratin" and cell.name in _MANY)
+            for direction in _OBLIQUE if many else _FEW:
+                yield Case(cell, Light(wavelength, *direction), Media(material))
 
 
 @cache
-def cell(surface: Surface) -> HeightField:
-    """Heights of a surface, mean 0."""
-    if surface.kind == "sinusoid":
+def _field(cell: Cell) -> HeightField:
+    if cell.kind == "sinusoid":
         line = np.cos(2 * np.pi * np.arange(_LINE) / _LINE)[None, :]
-        depth = surface.slope * surface.size * np.sqrt(2) / np.pi
+        depth = cell.slope * cell.size * np.sqrt(2) / np.pi
         heights = np.repeat(0.5 * depth * line, 2, axis=0)
-        return HeightField(heights, (surface.size / _LINE, _ROW), name=surface.name)
-    if surface.kind == "crossed":
+        return HeightField(heights, (cell.size / _LINE, _ROW), name=cell.name)
+    if cell.kind == "crossed":
         line = np.cos(2 * np.pi * np.arange(PIXELS) / PIXELS)
         heights = line[None, :] + line[:, None]
-        side = surface.size
-    elif surface.kind == "elaphe":
-        heights, side = _measured()[surface.name]
+        side = cell.size
+    elif cell.kind == "elaphe":
+        heights, side = _measured()[cell.name]
     else:
-        heights, side = _cut(surface, _source(surface))
+        heights, side = _cut(cell, _source(cell))
     heights = heights - heights.mean()
-    heights *= surface.slope / _slope(heights, side)
-    return HeightField(heights, side / PIXELS, name=surface.name)
+    heights *= cell.slope / _slope(heights, side)
+    return HeightField(heights, side / PIXELS, name=cell.name)
 
 
 def measured_cuts(patch: HeightField) -> dict[str, Cut]:
-    """Cuts of the measured scale, by the names of their surfaces."""
-    return {
-        surface.name: _cut(surface, patch)
-        for surface in SURFACES.values()
-        if surface.kind == "elaphe"
-    }
+    """Cuts of the measured scale, by the names of their cells."""
+    return {cell.name: _cut(cell, patch) for cell in CELLS.values() if cell.kind == "elaphe"}
 
 
 def save_measured(cuts: dict[str, Cut], folder: Path) -> Path:
@@ -159,20 +151,20 @@ def _measured() -> dict[str, Cut]:
         return {name: Cut(*cut) for name, *cut in zip(*columns, strict=True)}
 
 
-def _cut(surface: Surface, patch: HeightField) -> Cut:
+def _cut(cell: Cell, patch: HeightField) -> Cut:
     """Heights (`PIXELS`, `PIXELS`) of a cut, periodic and smooth, and its side."""
     pixel = patch.pixel_size[0]
-    count = 2 * round(surface.size / pixel / 2)
-    row, column = surface.place
+    count = 2 * round(cell.size / pixel / 2)
+    row, column = cell.place
     piece = patch.heights[row : row + count, column : column + count]
     periodic = _periodic(HeightField(piece, patch.pixel_size))
     side = count * pixel
     return Cut(_smoothed(periodic.heights, side), side)
 
 
-def _source(surface: Surface) -> HeightField:
-    """The generated patch that a surface is cut from."""
-    if surface.kind == "elaphe_like":
+def _source(cell: Cell) -> HeightField:
+    """The generated patch that a cell is cut from."""
+    if cell.kind == "elaphe_like":
         return gratings.elaphe_like(extent=20.0, pixels=410, seed=1)
     return gratings.cd(extent=64.0, pixels=1312, seed=0)
 
@@ -196,7 +188,7 @@ def _periodic(field: HeightField) -> HeightField:
     return HeightField(h - np.fft.ifft2(spectrum).real, field.pixel_size, name=field.name)
 
 
-def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:
+def _smoothed(heights: Real, side: float) -> Real:
     """Low frequencies at `PIXELS` samples a side, weighed by the Gaussian `_SMOOTHING`."""
     count = len(heights)
     harmonics = min(count, PIXELS) // 2 - 1  # harmonics either way, without Nyquist's
@@ -208,7 +200,7 @@ def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:
     return np.fft.ifft2(spectrum).real
 
 
-def _slope(heights: NDArray[np.float64], side: float) -> float:
+def _slope(heights: Real, side: float) -> float:
     """RMS of |∇h| of the band-limited surface."""
     count = len(heights)
     q = 2 * np.pi * np.fft.fftfreq(count, side / count)

@@ -13,7 +13,7 @@ from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile, lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.stations import Solver
 
-from .light import Light, light_of, powers_of
+from .light import Beam, light_of, powers_of
 
 #: Metal of the lamellar gratings.
 _METAL = 0.22 + 6.71j
@@ -34,7 +34,7 @@ class Published(NamedTuple):
     source: str
     grating: str
     profile: Profile
-    light: Light
+    light: Beam
     printed: dict[tuple[int, str], float]
     tolerance: float
     points: int

@@ -20,19 +20,18 @@ and I(γ)/γ is summed as a series of the spectra of hⁿ. Time exp(−iωt), le
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import resample
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.reference import boundary
 from mitsuba_diffraction.reference.fresnel import decaying_root
 
-from .crossed import HORIZON, Orders, is_crossed, lowest_orders
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+from .cases import Case
+from .crossed import HORIZON, is_crossed, lowest_orders
+from .solutions import Orders
 
 # Terms of the series of exp(iγh) end where they are below this
 _PRECISION = 1e-14
@@ -45,59 +44,49 @@ def name() -> str:
     return "Rayleigh's expansion, reduced (docs/make/validation/rayleigh.py)"
 
 
-def solve(
-    field: HeightField,
-    index: complex,
-    wavelength: float,
-    wi: NDArray[np.float64],
-    harmonics: int,
-) -> Orders:
-    """Amplitudes of every reflected order; parameters as `crossed.solve`.
+def resolutions(case: Case) -> tuple[int, int]:
+    """Numbers of spatial frequencies that the field is expanded in, first and finally."""
+    return (709, 999) if is_crossed(case.field) else (41, 61)
+
+
+def solve(case: Case, harmonics: int) -> Orders:
+    """Amplitudes of every reflected order, or of every order that goes through a dielectric.
+
+    Those that go through have equations of their own: with test waves that go up in the air, whose
+    product with all that is reflected carries nothing. That both powers add up to 1 is thus no
+    matter of course.
+
+    Parameters
+    ----------
+    harmonics : as `resolutions`.
 
     Raises
     ------
     DiffractionError
         If heights are beyond what the series of exp(iγh) can sum.
     """
-    waves = Waves(field, index, wavelength, wi, harmonics)
+    assert case.index is not None
+    waves, index = Waves(case, harmonics), case.index
     into = waves.incident
-    down = waves.below * [-1, -1, -1]
-    tests = axes(down, index)
-    reflected = waves.coupling(tests, down, axes(waves.above, 1.0), waves.above)
-    incident = waves.coupling(tests, down, axes(into, 1.0), into)
-    amplitudes = _solved(reflected, -incident)
-    out, mean = waves.above, waves.k * float(field.heights.mean())
-    return _orders(
-        waves, wi, amplitudes, mean, out, np.where(out[:, 2].imag == 0, out[:, 2].real, 0.0)
-    )
-
-
-def through(
-    field: HeightField,
-    index: complex,
-    wavelength: float,
-    wi: NDArray[np.float64],
-    harmonics: int,
-) -> Orders:
-    """Amplitudes of every order in a dielectric; as `solve`, `wo` within it, below the surface.
-
-    From equations of its own: with test waves that go up in the air, whose product with all that is
-    reflected carries nothing. That both powers add up to 1 is thus no matter of course.
-    """
-    waves = Waves(field, index, wavelength, wi, harmonics)
+    if not case.media.through:
+        down = waves.below * [-1, -1, -1]
+        tests = axes(down, index)
+        reflected = waves.coupling(tests, down, axes(waves.above, 1.0), waves.above)
+        incident = waves.coupling(tests, down, axes(into, 1.0), into)
+        out = waves.above
+        travels = np.where(out[:, 2].imag == 0, out[:, 2].real, 0.0)
+        return _orders(waves, case, _solved(reflected, -incident), out, travels)
     up, down = waves.above * [-1, -1, 1], waves.below * [1, 1, -1]
     tests = axes(up, 1.0)
     matrix = waves.coupling(tests, up, axes(down, index), down)
     # the light meets its own test wave alone: γ is 0, and the flux that of a level plane
     right = np.zeros((2 * len(up), 2), complex)
-    zeroth, into = waves.zeroth, waves.incident[0]
+    zeroth = waves.zeroth
     for row, test in enumerate(tests[:, zeroth]):
-        for column, e in enumerate(axes(waves.incident, 1.0)[:, 0]):
-            flux = np.cross(e, np.cross(up[zeroth], test)) - np.cross(test, np.cross(into, e))
+        for column, e in enumerate(axes(into, 1.0)[:, 0]):
+            flux = np.cross(e, np.cross(up[zeroth], test)) - np.cross(test, np.cross(into[0], e))
             right[row * len(up) + zeroth, column] = flux[2]
-    amplitudes = _solved(matrix, right)
-    mean = waves.k * float(field.heights.mean())
-    return _orders(waves, wi, amplitudes, mean, down / index, waves.below[:, 2].real)
+    return _orders(waves, case, _solved(matrix, right), down / index, waves.below[:, 2].real)
 
 
 def axes(vector: Complex, index: complex) -> Complex:
@@ -124,16 +113,14 @@ class Waves:
     Both go up; `incident` (1, 3) goes down.
     """
 
-    def __init__(
-        self, field: HeightField, index: complex, wavelength: float, wi: Real, harmonics: int
-    ) -> None:
+    def __init__(self, case: Case, harmonics: int) -> None:
+        field, wavelength = case.field, case.light.wavelength
         self.k = float(wavenumber(wavelength))
-        extent = field.extent
         crossed = is_crossed(field)
-        self.orders = lowest_orders(-wi, wavelength / 1000, extent, crossed, harmonics)
-        tangential = -wi[:2] + self.orders * (2 * np.pi / self.k / np.array(extent))
+        self.orders = lowest_orders(-case.wi, wavelength / 1000, field.extent, crossed, harmonics)
+        tangential = -case.wi[:2] + self.orders * (2 * np.pi / self.k / np.array(field.extent))
         square = np.sum(tangential**2, axis=1)
-        above, below = (decaying_root(n**2 - square) for n in (1.0 + 0j, complex(index)))
+        above, below = (decaying_root(n**2 - square) for n in (1.0 + 0j, complex(case.index)))
         self.above = np.column_stack([tangential, above])
         self.below = np.column_stack([tangential, below])
         self.zeroth = int(np.flatnonzero((self.orders == 0).all(axis=1))[0])
@@ -191,7 +178,7 @@ class _Spectra:
             heights = resample(resample(heights, 2 * nx, axis=1), 2 * ny, axis=0)
         self._heights, self._largest = heights, float(np.abs(heights).max())
 
-    def over_gamma(self, gamma: Complex, difference: NDArray[np.int64]) -> Complex:
+    def over_gamma(self, gamma: Complex, difference: Whole) -> Complex:
         """I(γ)/γ for orders that differ by (mx, my); mean over the period of exp(iγh + iQ·r)."""
         reach = float(np.abs(gamma).max()) * self._largest
         if reach > _LARGEST:
@@ -214,20 +201,20 @@ class _Spectra:
         return terms
 
 
-def _orders(
-    waves: Waves, wi: Real, amplitudes: Complex, mean: float, out: Complex, travels: Real
-) -> Orders:
+def _orders(waves: Waves, case: Case, amplitudes: Complex, out: Complex, travels: Real) -> Orders:
     """Return the propagating orders of the amplitudes (2n, 2), by `boundary.polarisation_axes`.
 
-    mean : of the heights, which the amplitudes' phases are from; out : (n, 3) unit vectors;
-    travels : (n,) their cosines, 0 of those that fade.
+    The amplitudes' phases are from the mean height. out : (n, 3) unit vectors; travels : (n,) their
+    cosines, 0 of those that fade.
     """
-    propagating = travels > HORIZON
+    wi, propagating = case.wi, travels > HORIZON
     wo = out[propagating].real
     pairs = np.moveaxis(amplitudes.reshape(2, len(out), 2), 1, 0)[propagating]
     s_solved = axes(out[propagating], 1.0)[0].real
     basis = axes(waves.incident, 1.0)[0].real[0]
     s_in, s_out = boundary.polarisation_axes(wi, wo)
     turned = boundary.turn(s_out, s_solved, wo) @ pairs @ boundary.turn(basis, s_in, -wi)
+    mean = waves.k * float(case.field.heights.mean())
     phase = np.exp(-1j * mean * (wi[2] + travels[propagating] * np.sign(wo[:, 2])))
-    return Orders(waves.orders[propagating], wo, phase[:, None, None] * turned)
+    jones = phase[:, None, None] * turned
+    return Orders.of_amplitudes(case, waves.orders[propagating], jones)

@@ -13,15 +13,14 @@ closed. The coherent part is the mirror's lobe of docs/theory.md, eq. 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import gammaln
 
-from mitsuba_diffraction import reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.optics.geometry import (
     diffraction_coordinates,
@@ -80,7 +79,7 @@ def mean_brdf(
     wavelength: ArrayLike,
     *,
     coherence_width: float,
-) -> NDArray[np.float64]:
+) -> Real:
     """BRDF (R = 1) averaged over all such surfaces, in closed form; arguments as
     `reference.brdf` takes them, shape (n,) in 1/sr.
     """
@@ -105,36 +104,6 @@ def mean_brdf(
 
 def _terms(g: float) -> int:
     return int(np.ceil(g + _SPREAD * np.sqrt(g))) + _EXTRA_TERMS
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Means over surfaces (n,), and the standard errors of those means."""
-
-    mean: NDArray[np.float64]
-    error: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, samples: NDArray[np.float64]) -> Estimate:
-        """Estimate the means of samples (surfaces, n)."""
-        error = samples.std(axis=0, ddof=1) / np.sqrt(len(samples))
-        return cls(samples.mean(axis=0), error)
-
-    def distance(self, exact: ArrayLike) -> NDArray[np.float64]:
-        """How far the means are from `exact`, in standard errors."""
-        return np.asarray((self.mean - np.asarray(exact)) / self.error)
-
-
-def estimate(
-    fields: Iterable[HeightField],
-    wi: ArrayLike,
-    wo: ArrayLike,
-    wavelength: ArrayLike,
-    **settings: Any,
-) -> Estimate:
-    """Average `reference.brdf` over fields; settings : its further arguments."""
-    samples = [reference.brdf(field, wi, wo, wavelength, **settings) for field in fields]
-    return Estimate.of(np.array(samples))
 
 
 def shifted(field: HeightField, count: int, seed: int = 0) -> Iterator[HeightField]:

@@ -1,7 +1,7 @@
 """Scans as parts of a larger surface: hues of gratings, and crops against the whole.
 
-A sinusoid has its orders in closed form, |a_m|² = J_m²(κ h/2) (Goodman, Introduction to Fourier
-Optics, section 4.4), seen through the light's window: exp(−σ²|q − q_m|²). A scan of a sinusoid
+A sinusoid has its orders in closed form (`closed_forms`), seen through the light's window:
+exp(−σ²|q − q_m|²). A scan of a sinusoid
 that is no whole number of periods must show the same hues. Crops of a rough surface must show the
 light of the whole, under the same window.
 """
@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import jv
 
 from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.heights.coherence import usual_window
 from mitsuba_diffraction.optics.geometry import sigma_of
 
-Real = NDArray[np.float64]
+from .cases import Grating
+from .closed_forms import order_power
+from .tapers import Seen
 
 LIGHT = 45.0  # degrees; the detector is at the normal
 #: Degrees from the mirror direction of light from 30°, at which crops are compared.
@@ -55,15 +56,13 @@ class Beside:
     Attributes
     ----------
     degrees : from the mirror direction.
-    ratio : of the mean over crops and wavelengths.
-    worst : largest ratio of the mean over crops at a wavelength, or its inverse.
+    seen : mean over crops.
     scatter : standard deviation of one crop's light over the mean.
     error : standard error of the ratio.
     """
 
     degrees: float
-    ratio: float
-    worst: float
+    seen: Seen
     scatter: float
     error: float
 
@@ -99,7 +98,8 @@ def hue(side: float, period: float, turn: float, order: int, phase: float) -> Hu
     sigma = sigma_of(usual_window(side))
     orders = np.arange(-12, 13)[:, None]
     apart = k * sine - 2 * np.pi * orders / period
-    lobes = jv(orders, k * up * half) ** 2 * np.exp(-((sigma * apart) ** 2))
+    powers = order_power(Grating("sinusoidal", period, 2.0 * half), orders, k * up)
+    lobes = powers * np.exp(-((sigma * apart) ** 2))
     # 4 cosθi cosθo N/(λ² w²) of a perfect reflector is as smooth as 1/λ²
     ideal = np.sum(lobes[orders[:, 0] != 0], axis=0) / lam**2
     (mean, wide, top), (expected, width, highest) = (_peak(lam, v) for v in (seen, ideal))
@@ -175,9 +175,7 @@ def crops(
             reference.brdf(field, wi, wo, lam, coherence_width=WIDTH) for field in (*wholes, *parts)
         ]
         exact, cuts = np.mean(values[:surfaces], axis=0), np.array(values[surfaces:])
-        mean = np.mean(cuts, axis=0)
-        worst = float(np.exp(np.abs(np.log(mean / exact)).max()))
         scatter = float(np.std(np.mean(cuts, axis=1)) / exact.mean())
-        error = scatter / np.sqrt(len(parts))
-        results.append(Beside(off, float(mean.mean() / exact.mean()), worst, scatter, error))
+        seen = Seen.between(np.mean(cuts, axis=0), exact)
+        results.append(Beside(off, seen, scatter, scatter / np.sqrt(len(parts))))
     return results

@@ -1,4 +1,4 @@
-"""Files of rigorous solutions: rows of numbers, and the solver that computed them."""
+"""Files of rigorous solutions: orders of cases, and the solver that computed them."""
 
 from __future__ import annotations
 
@@ -6,168 +6,194 @@ import importlib.metadata
 import json
 import os
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from mitsuba_diffraction.arrays import Complex, Real, Whole
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
-from .cases import MATERIALS, PROFILES, Grating, order_sines
+from .cases import DATA, MATERIALS, PROFILES, Case, Grating, Light, Media, Surface
+from .patches import CELLS
 
-#: Folder of the stored solutions.
-DATA = Path(__file__).parent / "data"
-#: Polarisations: electric and magnetic field along the grooves.
+#: Polarisations of the light: s and p, which on gratings in light across the grooves have the
+#: electric and the magnetic field along the grooves (TE, TM).
 LIGHTS = ("te", "tm")
 
-#: A row is one order of one grating at one wavelength and angle. Lengths in µm, wavelength in nm,
-#: theta in degrees; `te` and `tm` are the efficiencies (reflected power in this order, of the
-#: incident), electric and magnetic field along the grooves; `te_change` and `tm_change` are how
-#: much they changed when the solver's resolution doubled to its final value, and `te_balance` and
-#: `tm_balance` by how much all orders and the absorption miss 1. NaN is what a solver cannot do.
-ROW = np.dtype(
-    [
-        ("profile", "i1"),
-        ("period", "f4"),
-        ("depth", "f4"),
-        ("theta", "f4"),
-        ("wavelength", "f4"),
-        ("order", "i2"),
-        ("te", "f4"),
-        ("tm", "f4"),
-        ("te_change", "f2"),
-        ("tm_change", "f2"),
-        ("te_balance", "f2"),
-        ("tm_balance", "f2"),
-    ]
-)
-
-#: A grating at one angle and wavelength is left out if the last doubling changed one of its orders
-#: by more than this (absolute). The next doubling changes it by about a sixth of that.
+#: A case is left out if the last refinement changed one of its orders by more than this (absolute).
+#: The next doubling of a mesh changes it by about a sixth of that.
 CONVERGED = 5e-3
 
-#: What one solution is: rows that have these in common.
-KEY = ["profile", "period", "depth", "theta", "wavelength"]
+# Columns of a file: what has one case in common, and what each of its orders has
+_KEY = ("surface", "wavelength", "theta", "phi")
+_COLUMNS = {"order": "i2", "powers": "f4", "change": "f4", "balance": "f2", "jones": "c8"}
 
 
-class Efficiencies:
-    """Efficiencies of a scan by polarisation ("te", "tm").
+class Orders(NamedTuple):
+    """Orders that a solver found at one resolution.
 
     Attributes
     ----------
-    orders : a list with an array (orders,) for each wavelength, ordered as `cases.order_sines`.
-    balance : (wavelengths,) the sum of all orders and the absorption, minus 1; NaN where a solver
-        does not compute the absorption.
+    order : (n, 2) numbers.
+    powers : (n, 2) efficiencies (power in the order, of the incident) for s and p light; NaN is
+        what a solver cannot do.
+    balance : (2,) all orders and the absorption, minus 1; NaN where this is not computed.
+    jones : (n, 2, 2) amplitudes about `boundary.polarisation_axes`, phases from height 0.
     """
 
-    def __init__(self, wavelengths: int) -> None:
-        self.orders: dict[str, list[NDArray[np.float64]]] = {"te": [], "tm": []}
-        self.balance = {"te": np.full(wavelengths, np.nan), "tm": np.full(wavelengths, np.nan)}
+    order: Whole
+    powers: Real
+    balance: Sequence[float] = (np.nan, np.nan)
+    jones: Complex | None = None
+
+    @classmethod
+    def of_amplitudes(cls, case: Case, order: Whole, jones: Any) -> Orders:
+        """Return orders from their amplitudes."""
+        index = case.index.real if case.media.through and case.index else 1.0
+        cosines = index * np.abs(case.wo(order)[:, 2:]) / case.wi[2]
+        return cls(order, np.sum(np.abs(jones) ** 2, axis=1) * cosines, jones=jones)
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Orders of a case, as `Orders` has them.
+
+    Attributes
+    ----------
+    change : (n, 2) by how much the powers changed when the resolution grew to its final value.
+    """
+
+    case: Case
+    order: Whole
+    powers: Real
+    change: Real
+    balance: Real
+    jones: Complex
+
+    @classmethod
+    def between(cls, case: Case, coarse: Orders, fine: Orders) -> Solved:
+        """Return the finer orders, with their change from the coarse ones."""
+        before = dict(zip(map(tuple, coarse.order), coarse.powers, strict=True))
+        nothing = np.zeros(2)
+        change = [p - before.get(tuple(m), nothing) for m, p in zip(*fine[:2], strict=True)]
+        count = len(fine.order)
+        jones = np.full((count, 2, 2), np.nan) if fine.jones is None else fine.jones
+        balance = np.tile(fine.balance, (count, 1))
+        return cls(case, fine.order, fine.powers, np.abs(change), balance, jones)
+
+    @property
+    def converged(self) -> bool:
+        """Whether no order changed by more than `CONVERGED`."""
+        return bool(np.nanmax(self.change) <= CONVERGED)
+
+    @property
+    def wo(self) -> Real:
+        """Directions of the orders, (n, 3)."""
+        return self.case.wo(self.order)
+
+    @property
+    def efficiency(self) -> Real:
+        """Efficiencies for unpolarised light, (n,)."""
+        return self.powers.mean(axis=1)
 
 
 @dataclass(frozen=True)
 class Solutions:
-    """Rows (n,) of dtype `ROW`, and a description: solver, versions, settings, material."""
+    """Solved cases, and a description: solver, versions, settings, material."""
 
-    rows: NDArray[np.void]
-    about: Mapping[str, Any]
-
-    @property
-    def mean(self) -> NDArray[np.float64]:
-        """Efficiency for unpolarised light, (n,)."""
-        return 0.5 * (self.rows["te"].astype(float) + self.rows["tm"])
-
-    @property
-    def change(self) -> NDArray[np.float64]:
-        """Last change of each row, the larger of both polarisations, (n,)."""
-        return np.fmax(self.rows["te_change"], self.rows["tm_change"]).astype(float)
-
-    @property
-    def balance(self) -> NDArray[np.float64]:
-        """Energy missing or gained, the larger of both polarisations, (n,)."""
-        te, tm = np.abs(self.rows["te_balance"]), np.abs(self.rows["tm_balance"])
-        return np.fmax(te, tm).astype(float)
-
-    @property
-    def converged(self) -> NDArray[np.bool_]:
-        """Whether a row belongs to a solution that has converged (`CONVERGED`), (n,)."""
-        _, solution = np.unique(self.rows[KEY], return_inverse=True)
-        worst = np.zeros(solution.max(initial=-1) + 1)
-        np.maximum.at(worst, solution.ravel(), self.change)
-        return np.asarray(worst[solution.ravel()] <= CONVERGED)
+    solved: Sequence[Solved]
+    about: Mapping[str, Any] = field(default_factory=dict)
 
     def where(self, **values: Any) -> Solutions:
-        """The rows with these values: a grating, or such as profile="lamellar" or theta=30.0."""
-        return Solutions(self.rows[self.having(**values)], self.about)
-
-    def having(self, grating: Grating | None = None, **values: Any) -> NDArray[np.bool_]:
-        """Which rows have these values, (n,); as in `where`."""
-        keep = np.ones(len(self.rows), bool)
-        if grating is not None:
-            values |= vars(grating)
-        for name, value in values.items():
-            wanted: Any = PROFILES.index(value) if name == "profile" else np.float32(value)
-            keep &= self.rows[name] == wanted
-        return keep
+        """The cases with these values: a grating, or such as profile="lamellar" or theta=30.0."""
+        return Solutions([s for s in self.solved if s.case.has(**values)], self.about)
 
     def trusted(self) -> Solutions:
-        """The rows that have converged."""
-        return Solutions(self.rows[self.converged], self.about)
+        """The cases that have converged."""
+        return Solutions([s for s in self.solved if s.converged], self.about)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """An attribute of the orders of all cases."""
+        return np.concatenate([getattr(s, name) for s in self.solved])
 
 
-def load(path: str | os.PathLike[str]) -> Solutions:
-    """Read what `save_rows` wrote.
+@cache
+def surface_of(name: str) -> Surface:
+    """Return the surface that has this name in files."""
+    if name in CELLS:
+        return CELLS[name]
+    profile, _, lengths = name.removesuffix(" µm").partition(" ")
+    if profile not in PROFILES:
+        raise ValueError(f"surface '{name}' is unknown")
+    return Grating(profile, *map(float, lengths.split("/")))
 
-    Raises
-    ------
-    DiffractionError
-        If the file is missing or no set of solutions.
-    """
-    return Solutions(*load_rows(path, ROW))
 
-
-def save_rows(
-    rows: NDArray[np.void], about: Mapping[str, Any], path: str | os.PathLike[str]
-) -> None:
-    """Write rows of any type as columns of an .npz file, and what made them.
+def save(
+    solved: Iterable[Solved], about: Mapping[str, Any], path: str | os.PathLike[str]
+) -> Solutions:
+    """Write solutions as columns of an .npz file, and what made them; return them.
 
     Raises
     ------
     DiffractionError
         If it cannot be written.
     """
+    every = Solutions(list(solved), about)
+    keys = [(str(s.case.surface), *s.case.light) for s in every.solved for _ in s.order]
+    columns = dict(zip(_KEY, map(np.array, zip(*keys, strict=True)), strict=True))
+    columns |= {name: every.column(name).astype(dtype) for name, dtype in _COLUMNS.items()}
+    if np.isnan(columns["jones"]).all():
+        del columns["jones"]
     text = json.dumps(dict(about), indent=1, ensure_ascii=False)
-    columns = {name: rows[name] for name in rows.dtype.names or ()}
     with atomic_path(path) as temporary:
         np.savez_compressed(temporary, allow_pickle=False, about=np.array(text), **columns)
+    return every
 
 
-def load_rows(
-    path: str | os.PathLike[str], dtype: np.dtype[np.void]
-) -> tuple[NDArray[np.void], Mapping[str, Any]]:
-    """Read rows of this type, and what made them, as `load`."""
+def load(path: str | os.PathLike[str], media: Media) -> Solutions:
+    """Read what `save` wrote, of surfaces in some media.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is missing or no set of solutions.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
-            columns = {name: file[name] for name in dtype.names or ()}
             about = json.loads(str(file["about"]))
+            keys = zip(*(file[name].tolist() for name in _KEY), strict=True)
+            columns = [file[name] for name in _COLUMNS if name in file]
+        rows = groupby(enumerate(keys), key=lambda row: row[1])
+        solved = []
+        for (surface, *light), group in rows:
+            members = [n for n, _ in group]
+            part = slice(members[0], members[-1] + 1)
+            order, powers, change, *others = (column[part] for column in columns)
+            none = np.full((len(members), 2, 2), np.nan)
+            balance, jones = (*others, none)[:2]
+            case = Case(surface_of(surface), Light(*light), media)
+            exact = (each.astype(float) for each in (powers, change, balance))
+            solved.append(Solved(case, order.astype(np.int64), *exact, jones))
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
         reason = " ".join(str(error).split())
         raise DiffractionError(
             f"cannot read solutions from '{os.fspath(path)}': {reason}; "
             "make them with `python -m docs.make.validation.solve`"
         ) from error
-    rows = np.empty(len(next(iter(columns.values()))), dtype)
-    for name, column in columns.items():
-        rows[name] = column
-    return rows, about
+    return Solutions(solved, about)
 
 
 def shipped(material: str, solver: str = "integral") -> Solutions:
-    """The solutions that come with the package.
+    """The solutions of a material that are stored.
+
+    solver : "integral" or "coupled_wave" of gratings, "patches_rayleigh" or "patches_coupled_wave"
+        of cells.
 
     Raises
     ------
@@ -178,49 +204,12 @@ def shipped(material: str, solver: str = "integral") -> Solutions:
         raise DiffractionError(
             f"material '{material}' is unknown; choose one of {', '.join(MATERIALS)}"
         )
-    return stored(f"{material}_{solver}")
+    return stored(f"{material}_{solver}", Media(material))
 
 
-def stored(file: str) -> Solutions:
+def stored(file: str, media: Media) -> Solutions:
     """The solutions of a file of `DATA`, named without its suffix."""
-    return load(DATA / f"{file}.npz")
-
-
-class Work(NamedTuple):
-    """Cases that are solved together.
-
-    Attributes
-    ----------
-    cases : arguments of `solve`.
-    solve : returns rows by file of `DATA`, named without its suffix; runs in other processes.
-    about : solver, material and more of each file.
-    """
-
-    cases: Sequence[Any]
-    solve: Callable[[Any], dict[str, NDArray[np.void]]]
-    about: dict[str, dict[str, Any]]
-
-
-def order_rows(
-    grating: Grating, theta: float, wavelength: float,
-    coarse: Sequence[ArrayLike], fine: Sequence[ArrayLike],
-    balance: Sequence[float] = (np.nan, np.nan),
-) -> NDArray[np.void]:  # fmt: skip
-    """Return rows of `ROW` of a grating in light of one direction and wavelength.
-
-    coarse, fine : efficiencies of the orders of `cases.order_sines` for each of `LIGHTS`, of the
-        last two resolutions.
-    """
-    orders, _ = order_sines(grating.period, wavelength, theta)
-    rows = np.empty(len(orders), ROW)
-    rows["profile"] = PROFILES.index(grating.profile)
-    rows["period"], rows["depth"] = grating.period, grating.depth
-    rows["theta"], rows["wavelength"], rows["order"] = theta, wavelength, orders
-    for n, light in enumerate(LIGHTS):
-        rows[light] = fine[n]
-        rows[f"{light}_change"] = np.abs(np.subtract(fine[n], coarse[n]))
-        rows[f"{light}_balance"] = balance[n]
-    return rows
+    return load(DATA / f"{file}.npz", media)
 
 
 def imported(module: str) -> Any:

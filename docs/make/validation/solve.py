@@ -14,7 +14,6 @@ import itertools
 import multiprocessing
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -22,86 +21,93 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from docs.make.figures.pages import option, program, progress_option
 from mitsuba_diffraction.cli import Bar, check_outputs
 
-from . import coated, coupled_wave, filmed, integral, patch_solutions
-from .cases import MATERIALS, Scan, index_text, scans
-from .solutions import DATA, LIGHTS, Solutions, Work, order_rows, save_rows
+from . import coated, coupled_wave, crossed, filmed, integral, rayleigh
+from .cases import (
+    DATA,
+    FEW_WAVELENGTHS,
+    MATERIALS,
+    Case,
+    Grating,
+    Light,
+    Media,
+    grating_cases,
+    index_text,
+)
+from .models import ANGLES
+from .patches import cell_cases
+from .solutions import Solved, save
 
-#: Each solves a `Scan` at one of its `resolutions`.
-SOLVERS: dict[str, ModuleType] = {"integral": integral, "coupled_wave": coupled_wave}
+#: Each solves a `Case` at one of its `resolutions`.
+SOLVERS: dict[str, ModuleType] = {
+    "integral": integral,
+    "coupled_wave": coupled_wave,
+    "patches_coupled_wave": crossed,
+    "patches_rayleigh": rayleigh,
+    "coated": coated,
+    "films": filmed,
+}
+#: Cases by file, named without its suffix; all files of one command have as many.
+Work = dict[str, list[Case]]
 
 
-def of_gratings(material: str, solver: str) -> Work:
-    """Return all scans of a material, or those that both solvers are compared on."""
-    method, wanted = SOLVERS[solver], scans(material)
-    if method is coupled_wave:
-        wanted = coupled_wave.part_of(wanted)
-    file = f"{material}_{solver}"
-    about = {"solver": method.name(), "material": material, "index": index_text(material)}
-    return Work(wanted, partial(_by_file, file, solver), {file: about})
+def of_material(material: str, solver: str) -> Work:
+    """Return all cases of a material, or those that both solvers are compared on."""
+    cells = solver.startswith("patches")
+    cases = list(cell_cases(material)) if cells else grating_cases(material)
+    return {
+        f"{material}_{solver}": coupled_wave.part_of(cases) if solver == "coupled_wave" else cases
+    }
 
 
-#: Cases by the names of the command.
-WORKS: dict[str, Callable[[], Work]] = {
+def of_layers(gratings: Sequence[Grating], media: dict[str, Media]) -> Work:
+    """Return gratings under layers, by file."""
+    lights = list(itertools.product(FEW_WAVELENGTHS, ANGLES))
+    return {
+        file: [Case(grating, Light(*light), each) for grating in gratings for light in lights]
+        for file, each in media.items()
+    }
+
+
+#: Cases, and the name of their solver, by the names of the command.
+WORKS: dict[str, tuple[Callable[[], Work], str]] = {
     **{
-        f"{material}_{solver}": partial(of_gratings, material, solver)
+        f"{material}_{solver}": (partial(of_material, material, solver), solver)
+        for solver in list(SOLVERS)[:4]
         for material in MATERIALS
-        for solver in SOLVERS
-        if material != "perfect" or solver == "integral"  # coupled waves need an index
+        if material != "perfect" or solver == "integral"  # the others need an index
     },
-    **{
-        patch_solutions.file_of(material, solver): partial(patch_solutions.work, material, solver)
-        for material in ("aluminium", "keratin")
-        for solver in patch_solutions.SOLVERS
-    },
-    "coated": coated.work,
-    "films": filmed.work,
+    "coated": (partial(of_layers, coated.GRATINGS, coated.COATS), "coated"),
+    "films": (
+        partial(
+            of_layers, filmed.GRATINGS, {filmed.file_of(n): m for n, m in filmed.FILMS.items()}
+        ),
+        "films",
+    ),
 }
 
 
-def _by_file(file: str, solver: str, scan: Scan) -> dict[str, NDArray[np.void]]:
-    return {file: solve_scan(scan, solver=solver)}
+def solve_case(
+    case: Case, resolutions: Sequence[Any] | None = None, *, solver: str = "integral"
+) -> Solved:
+    """Solve a case at the first two resolutions, by default the solver's own.
 
-
-def solve_scan(
-    scan: Scan, resolutions: Sequence[Any] | None = None, *, solver: str = "integral"
-) -> NDArray[np.void]:
-    """Rows of one scan.
-
-    It is solved at the first two resolutions, by default the solver's own; wavelengths that have
-    not converged between these (`solutions.CONVERGED`) at the next ones, as far as there are any.
+    If it has not converged between these (`Solved.converged`), it is solved at the next ones, as
+    far as there are any.
     """
     method = SOLVERS[solver]
-    levels = list(resolutions or method.resolutions(scan))
-    rows_of_scan = _solve_twice(scan, method, levels[0], levels[1])
-    for coarse, fine in itertools.pairwise(levels[1:]):
-        open_ones = np.unique(rows_of_scan.rows["wavelength"][~rows_of_scan.converged])
-        if not len(open_ones):
+    first, *finer = resolutions or method.resolutions(case)
+    coarse = method.solve(case, first)
+    for resolution in finer:
+        fine = method.solve(case, resolution)
+        solved = Solved.between(case, coarse, fine)
+        if solved.converged:
             break
-        part = replace(scan, wavelengths=tuple(float(w) for w in open_ones))
-        better = _solve_twice(part, method, coarse, fine)
-        rows = rows_of_scan.rows.copy()
-        rows[np.isin(rows["wavelength"], open_ones)] = better.rows
-        rows_of_scan = Solutions(rows, {})
-    return rows_of_scan.rows
-
-
-def _solve_twice(scan: Scan, method: ModuleType, first: Any, final: Any) -> Solutions:
-    """A scan at the `final` resolution, with the change from the `first` one."""
-    coarse, fine = method.solve(scan, first), method.solve(scan, final)
-    rows = [
-        order_rows(
-            scan.grating, scan.theta, wavelength,
-            *([each.orders[light][n] for light in LIGHTS] for each in (coarse, fine)),
-            balance=[fine.balance[light][n] for light in LIGHTS],
-        )
-        for n, wavelength in enumerate(scan.wavelengths)
-    ]  # fmt: skip
-    return Solutions(np.concatenate(rows), {})
+        coarse = fine
+    return solved
 
 
 #: Threads of one process: BLAS in each would fight the others for the processors.
@@ -126,29 +132,34 @@ def _jobs(text: str) -> int:
 )
 def main(args: argparse.Namespace) -> None:
     """Solve the cases of a name and write their files."""
-    work = WORKS[args.name]()
-    paths = {file: args.output / f"{file}.npz" for file in work.about}
+    make, solver = WORKS[args.name]
+    work, name = make(), SOLVERS[solver].name()
+    paths = {file: args.output / f"{file}.npz" for file in work}
     check_outputs(list(paths.values()))
-    rows: dict[str, list[NDArray[np.void]]] = {file: [] for file in paths}
+    # neighbours differ in their media alone, and share what is solved once for all media
+    cases = [case for same in zip(*work.values(), strict=True) for case in same]
+    solved: list[Solved] = []
     # Children start anew: what they inherit of BLAS's threads could not be changed
     with (
         Bar(args, unit=" cases") as bar,
         mock.patch.dict(os.environ, _ONE),
         multiprocessing.get_context("spawn").Pool(args.jobs) as pool,
     ):
-        for n, solved in enumerate(pool.imap(work.solve, work.cases)):
-            for file, part in solved.items():
-                rows[file].append(part)
-            bar(n + 1, len(work.cases), f"solving {args.name}")
-    made = {
-        "command": f"python -m docs.make.validation.solve {args.name}",
-        "date": datetime.date.today().isoformat(),
-    }
-    for file, path in paths.items():
-        every = np.concatenate(rows[file])
-        save_rows(every, made | work.about[file], path)
-        change = max(np.nanmax(every[c]) for c in every.dtype.names or () if c.endswith("change"))
+        for each in pool.imap(partial(solve_case, solver=solver), cases, len(work)):
+            solved.append(each)
+            bar(len(solved), len(cases), f"solving {args.name}")
+    for n, (file, path) in enumerate(paths.items()):
+        media = work[file][0].media
+        about = {
+            "command": f"python -m docs.make.validation.solve {args.name}",
+            "date": datetime.date.today().isoformat(),
+            "solver": name,
+            "material": media.text,
+            "index": index_text(media.material),
+        }
+        every = save(solved[n :: len(work)], about, path)
+        change = np.nanmax(every.column("change"))
         print(
-            f"wrote {path}: {len(every)} orders; the last refinement changed them by "
-            f"{change:.1g} at most"
+            f"wrote {path}: {len(every.column('order'))} orders; the last refinement changed them "
+            f"by {change:.1g} at most"
         )

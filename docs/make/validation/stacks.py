@@ -20,7 +20,8 @@ from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import CrossedStation, Grating
 
 from . import crossed
-from .light import direction, light_on, powers_of
+from .cases import Case, Light, Media, Sampled
+from .light import light_on, powers_of
 from .solutions import imported
 
 # Wavelengths of the structures, nm
@@ -206,15 +207,16 @@ def _crossed() -> Iterator[Compared]:
     lumps = 0.25 * (1.0 - np.cos(x)) * (1.0 - np.cos(y)) + 0.2 * np.sin(x)
     # without mirror planes, so that every sign shows
     field = HeightField(0.1 * (lumps + 0.1 * np.sin(x + 2.0 * y)), 0.5 / pixels)
-    wi = direction(theta, phi)
-    station = CrossedStation(-wi[0], -wi[1], 1e-3 * lam, 1.5 + 0j, field.extent)
+    case = Case(Sampled(field), Light(lam, theta, phi), Media(1.5))
+    x, y = -case.wi[:2]
+    station = CrossedStation(x, y, 1e-3 * lam, case.index, field.extent)
     solver = CrossedWaves(UnitCell(field.heights, field.extent), 5)
     orders = station.orders.tolist()
     amplitudes = solver.amplitudes(station)[0, orders.index([0, 0])]
     found = (np.abs(amplitudes) ** 2).sum(axis=-1).mean(axis=0)
-    solved = crossed.solve(field, 1.5, lam, wi, 121, 16)
-    for (m, n), wo, jones in zip(solved.order.tolist(), solved.wo, solved.jones, strict=True):
-        truth = 0.5 * float((np.abs(jones) ** 2).sum()) * wo[2] / wi[2]
-        case = f"lumps of glass, 0.5 µm apart in x and y, order ({m}, {n})"
+    solved = crossed.solve(case, (121, 16))
+    for (m, n), truth in zip(solved.order.tolist(), solved.powers.mean(axis=1), strict=True):
+        name = f"lumps of glass, 0.5 µm apart in x and y, order ({m}, {n})"
         light = f"{theta:g}°, azimuth {phi:g}°, {lam:g} nm"
-        yield Compared(case, light, float(found[orders.index([m, n])]), truth, "grcwa")
+        found_here = float(found[orders.index([m, n])])
+        yield Compared(name, light, found_here, float(truth), "grcwa")

@@ -13,12 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import i0
 
+from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.heights.coherence import LOOKUP, SHARPENING, TAPER
 
-Real = NDArray[np.float64]
 #: Taper at places u from −1 to 1, the window's edges.
 Taper = Callable[[Real], Real]
 
@@ -77,7 +76,7 @@ ESTIMATORS = {
 
 @dataclass(frozen=True)
 class Seen:
-    """Light of low relief through windows over that through the light's Gaussian window.
+    """Light of windows or crops over that of the whole through the light's Gaussian window.
 
     Attributes
     ----------
@@ -87,6 +86,12 @@ class Seen:
 
     ratio: float
     worst: float
+
+    @classmethod
+    def between(cls, light: Real, whole: Real) -> Seen:
+        """Compare light with that of the whole by wavelength."""
+        worst = np.exp(np.abs(np.log(light / whole)).max())
+        return cls(float(light.mean() / whole.mean()), float(worst))
 
 
 def lobe_widths(estimator: Estimator, count: int = 300) -> Real:
@@ -127,10 +132,7 @@ def seen(estimator: Estimator, spectrum: Callable[[Real, Real], Real], width: fl
         near = surface[:, columns]
         kappa = k * (np.cos(light) + np.cos(out))
         values.append([kappa**2 * (e @ (near @ e)) / e.sum() ** 2 for e in (lobe, ideal)])
-    ours, exact = np.array(values).T
-    return Seen(
-        float(ours.mean() / exact.mean()), float(np.exp(np.abs(np.log(ours / exact)).max()))
-    )
+    return Seen.between(*np.array(values).T)
 
 
 def _transform(taper: Taper, width: float, q: Real) -> Real:

@@ -1,31 +1,25 @@
 """Transmitted orders of dielectric gratings beside Rayleigh's expansion, and R + T of surfaces.
 
-Rayleigh's expansion takes a fraction of a second a grating (`rayleigh.through`), so the solutions
+Rayleigh's expansion takes a fraction of a second a grating, so the solutions
 are computed with the page and not stored.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mitsuba_diffraction import DiffractionTable, TableSource, gratings, reference
+from mitsuba_diffraction import DiffractionTable, TableSource, gratings
 from mitsuba_diffraction.analysis.energy import sides_summary
-from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.reference import boundary
 
 from . import rayleigh
-from .cases import FEW_WAVELENGTHS, KERATIN, Grating
-from .compare import GRAZING, misplaced
-from .light import direction
-from .model import LOBE_SIGMA
-
-Real = NDArray[np.float64]
+from .cases import FEW_WAVELENGTHS, Case, Grating, Light, Media
+from .compare import compare
+from .models import of_colours
+from .solutions import Solutions, Solved
 
 #: Sinusoids whose steepest slopes are 0.03, 0.06, 0.1, 0.1 and 0.2.
 GRATINGS = tuple(
@@ -48,35 +42,8 @@ SURFACES = {
 PRECOMPUTE = sorted((Path(__file__).parents[3] / "precompute").glob("*.toml"))
 #: Index of the surfaces and recipes.
 INDEX = 1.5
-_HARMONICS, _PIXELS = 31, 64
-
-
-@cache
-def _solved(grating: Grating, theta: float, azimuth: float, wavelength: float) -> rayleigh.Orders:
-    wi = direction(theta, azimuth)
-    return rayleigh.through(grating.heights(_PIXELS), KERATIN, wavelength, wi, _HARMONICS)
-
-
-def _efficiencies(
-    grating: Grating, theta: float, azimuth: float, wavelength: float, model: str
-) -> tuple[Real, Real]:
-    """Efficiencies of colours by one of `MODELS` and by Rayleigh's expansion, light from above."""
-    exact, wi = _solved(grating, theta, azimuth, wavelength), direction(theta, azimuth)
-    cosines = -KERATIN * exact.wo[:, 2]
-    btdf = reference.btdf(
-        grating.heights(_PIXELS), wi, exact.wo, wavelength,
-        eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * LOBE_SIGMA, model=model,
-    )  # fmt: skip
-    per_btdf = np.pi / (LOBE_SIGMA * float(wavenumber(wavelength))) ** 2
-    coloured = (exact.order != 0).any(axis=1) & (-exact.wo[:, 2] > np.cos(np.radians(GRAZING)))
-    rigorous = boundary.unpolarised(exact.jones) * cosines / wi[2]
-    return (per_btdf * btdf)[coloured], rigorous[coloured]
-
-
-def deviation(grating: Grating, theta: float, azimuth: float, model: str) -> float:
-    """Deviation of transmitted colours, Σ|η − η_rigorous| / Σ η_rigorous at both wavelengths."""
-    parts = (_efficiencies(grating, theta, azimuth, lam, model) for lam in FEW_WAVELENGTHS)
-    return misplaced(*map(np.concatenate, zip(*parts, strict=True)))
+_HARMONICS = 31
+_THROUGH = Media("keratin", through=True)
 
 
 class Deviations(NamedTuple):
@@ -88,16 +55,21 @@ class Deviations(NamedTuple):
 
 
 def deviations(chosen: Sequence[Grating] = GRATINGS) -> list[Deviations]:
-    """Compare both models on gratings at all `AZIMUTHS`."""
-    return [
-        Deviations(
-            grating,
-            azimuth,
-            [[deviation(grating, theta, azimuth, m) for theta in ANGLES] for m in MODELS],
-        )
-        for grating in chosen
-        for azimuth in AZIMUTHS
-    ]
+    """Compare both models on gratings at all `AZIMUTHS`, in light of two wavelengths from above."""
+    compared = []
+    for grating in chosen:
+        cases = itertools.product(FEW_WAVELENGTHS, ANGLES, AZIMUTHS)
+        solved = Solutions([_solved(Case(grating, Light(*light), _THROUGH)) for light in cases])
+        sides = [compare(solved, model) for model in MODELS]
+        for phi in AZIMUTHS:
+            values = [[of_colours(s.where(theta=t, phi=phi)) for t in ANGLES] for s in sides]
+            compared.append(Deviations(grating, phi, values))
+    return compared
+
+
+def _solved(case: Case) -> Solved:
+    orders = rayleigh.solve(case, _HARMONICS)
+    return Solved.between(case, orders, orders)
 
 
 class Sums(NamedTuple):

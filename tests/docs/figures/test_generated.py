@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from docs.make.figures import formats, interfaces, pages, solved
+from docs.make.figures import interfaces, pages, solved
+from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights.formats.catalogue import ARRAYS, OPTICAL, PROBES
 from tests.support import ROOT
 from tests.support.pages import PAGES
@@ -24,7 +25,7 @@ def test_every_command_has_a_place():
 
 
 def test_the_page_has_the_tables_of_formats():
-    assert pages.part(PAGES["docs/formats.md"], "formats") == formats.tables()
+    assert pages.part(PAGES["docs/formats.md"], "formats") == interfaces.format_tables()
 
 
 def test_listed_suffixes_are_of_formats_that_the_library_reads():
@@ -48,3 +49,12 @@ def test_the_page_has_the_numbers_of_the_shipped_tables(monkeypatch):
     made = numbers(solved.text())
     assert len(made) > 20
     assert numbers(pages.part(PAGES["docs/orders.md"], "solved")) == made
+
+
+def test_a_part_is_replaced_and_all_else_stays():
+    text = "a\n<!-- begin t -->\nold\n<!-- end t -->\nb\n"
+    new = pages.replaced(text, "t", "new\n")
+    assert new == "a\n<!-- begin t -->\nnew\n<!-- end t -->\nb\n"
+    assert pages.part(new, "t") == "new"
+    with pytest.raises(DiffractionError):
+        pages.replaced(text + text, "t", "new")

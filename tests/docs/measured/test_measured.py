@@ -1,13 +1,15 @@
-"""Measured gratings: their data and grooves."""
+"""Measured gratings: their data, grooves and page."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from docs.make.measured import cases, predict
+from docs.make.measured.__main__ import main
 from docs.make.measured.grooves import Groove
 from docs.make.validation.light import heights_of
 
@@ -52,3 +54,14 @@ def test_the_model_is_near_solved_orders_through_gentle_grooves():
 
 def test_roughness_takes_light_out_of_the_orders():
     assert Groove(5.0, roughness=20.0).specular(500.0, 2.0) == pytest.approx(0.777, abs=1e-3)
+
+
+@pytest.mark.thorough
+def test_the_page_is_whole(tmp_path, capsys):
+    assert main(["--quick", "-o", str(tmp_path)]) == 0
+    text = (tmp_path / "validation" / "measured.md").read_text(encoding="utf-8")
+    assert not re.search(r"\bnan\b", text)
+    assert "{" not in text
+    assert text.count("GMOS B1200") == 2
+    assert (tmp_path / "images" / "measured_gratings.png").stat().st_size > 10_000
+    assert "solved orders are within" in capsys.readouterr().out

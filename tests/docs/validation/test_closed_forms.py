@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from docs.make.validation.cases import PROFILES, WAVELENGTHS, Grating, order_sines
+from docs.make.validation.cases import PROFILES, WAVELENGTHS, Grating, in_plane, order_sines
 from docs.make.validation.closed_forms import ANGLES, deviations, order_power
-from docs.make.validation.model import in_plane
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
 from mitsuba_diffraction.optics.mirror import horizon_correction

@@ -1,4 +1,4 @@
-"""What was asked of the default model: the tables of goals and of what misses them."""
+"""What was asked of the default model beside Kirchhoff's: goals, and what misses them."""
 
 from __future__ import annotations
 
@@ -6,23 +6,22 @@ import numpy as np
 import pytest
 
 from docs.make.validation import goals
-from docs.make.validation.cases import Grating, index_of, order_sines
-from docs.make.validation.compare import compare
-from docs.make.validation.model import in_plane, order_efficiencies
-from docs.make.validation.models import compare_all
-from docs.make.validation.solutions import shipped
+from docs.make.validation.cases import Grating, index_of
+from docs.make.validation.compare import Sides, compare
+from docs.make.validation.models import ANGLES, banded, compare_all
+from docs.make.validation.solutions import Solutions, shipped
 from mitsuba_diffraction.reference import boundary, model
 
 pytestmark = pytest.mark.thorough
 
 
 @pytest.fixture(scope="module")
-def sides() -> goals.Sides:
-    return compare_all({name: compare(name) for name in ("keratin", "aluminium")})
+def sides() -> Sides:
+    return compare_all({name: shipped(name) for name in ("keratin", "aluminium")})
 
 
 @pytest.fixture(scope="module")
-def cases(sides) -> list[goals.Case]:
+def cases(sides) -> list[goals.Selection]:
     return goals.singles(goals.with_half(sides, "aluminium"))
 
 
@@ -48,20 +47,39 @@ def test_on_aluminium_few_gratings_are_worse_and_by_little(cases):
     assert gains.mean() > 0.005
 
 
+def test_on_aluminium_it_is_no_worse_in_any_band(sides):
+    old, new = (list(banded(sides["aluminium", name])) for name in ("kirchhoff", "small_slope"))
+    for (name, band, before), (_, _, after) in zip(old, new, strict=True):
+        for theta, was, now in zip(ANGLES, before, after, strict=True):
+            # Kirchhoff's errors of the two polarisations cancel: blazed 1.1/0.1 µm at 30° has 47 %
+            # of the mean, 54 and 68 % of either; and where both are as good as exact
+            assert now <= max(1.01 * was, was + 5e-5), (name, band, theta)
+    assert new[0][2][2] < 0.3 * old[0][2][2]  # gentle sinusoids at 60°
+
+
+def test_on_aluminium_either_polarisation_is_far_better(sides):
+    chosen = {"profile": "sinusoidal", "period": 2.5, "theta": 60.0, "wavelength": 610.0}
+    old, new = (sides["aluminium", name].where(**chosen) for name in ("kirchhoff", "small_slope"))
+    for depth in (0.05, 0.1, 0.2):
+        for light in ("te", "tm"):
+            before, after = (
+                part.where(depth=depth).deviation(colours=True, light=light) for part in (old, new)
+            )
+            assert after < 0.4 * before, depth
+
+
 def test_shares_lie_between_the_two_matrices():
-    grating, theta, wavelength = Grating("blazed", 1.1, 0.1), 30.0, 460.0
-    chosen = shipped("aluminium").where(
-        profile="blazed", period=1.1, depth=0.1, theta=theta, wavelength=wavelength
+    (solved,) = (
+        shipped("aluminium")
+        .where(grating=Grating("blazed", 1.1, 0.1), theta=30.0, wavelength=460.0)
+        .solved
     )
     models = {
-        name: compare("aluminium", chosen, name)
+        name: compare(Solutions([solved]), name)
         for name in ("kirchhoff", "half_and_half", "small_slope_alone")
     }
-    index = index_of("aluminium", wavelength)
-    _, sines = order_sines(grating.period, wavelength, theta)
-    lit = in_plane(np.sin(np.radians(theta))), in_plane(sines), index
-    direct = order_efficiencies(grating, "aluminium", theta, wavelength)
-    direct *= boundary.unpolarised(model.blended(*lit, 0.25))
+    lit = solved.case.wi, solved.wo, index_of("aluminium", 460.0)
+    direct = models["kirchhoff"].model * boundary.unpolarised(model.blended(*lit, 0.25))
     direct /= boundary.unpolarised(model.kirchhoff(*lit))
     assert goals._by_share(models)[25] == pytest.approx(direct, rel=1e-9)
 

@@ -32,8 +32,8 @@ def test_the_report_is_whole(tmp_path, capsys):
 
 
 def test_a_page_is_written_alone(tmp_path):
-    assert main(["solutions", "--quick", "-o", str(tmp_path)]) == 0
-    assert [path.name for path in tmp_path.rglob("*.md")] == ["solutions.md"]
+    assert main(["layers", "--quick", "-o", str(tmp_path)]) == 0
+    assert [path.name for path in tmp_path.rglob("*.md")] == ["layers.md"]
 
 
 def test_numbers_have_the_digits_that_they_deserve():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from docs.make.validation import statistics
-from docs.make.validation.model import in_plane
+from docs.make.validation.cases import in_plane
 from docs.make.validation.roughness import Roughness, mean_brdf, mean_order_0
 from mitsuba_diffraction import HeightField, reference
 
@@ -33,22 +33,22 @@ def test_heights_have_the_spread_slope_and_correlation_asked_for():
 
 def test_specular_loss_of_seeded_surfaces():
     found = statistics.specular(150, extent=20.0, pixels=64)
-    assert np.abs(found.power.distance(found.exact)).max() < DISTANCE
+    assert np.abs(found.distance).max() < DISTANCE
     # it tells exp(−g) from a few per cent more roughness
-    assert found.power.error[3] < 0.02 * found.power.mean[3]
+    assert found.error[3] < 0.02 * found.mean[3]
 
 
 @pytest.mark.parametrize("rms", [0.02, 0.05, 0.1])
 def test_scattered_lobes_follow_beckmann_and_spizzichino(rms):
     found = statistics.lobe(rms, 60)
-    assert np.abs(found.measured.distance(found.exact)).max() < DISTANCE
-    assert np.all(found.measured.error < 0.2 * found.exact)
+    assert np.abs(found.distance).max() < DISTANCE
+    assert np.all(found.error < 0.2 * found.exact)
 
 
 def test_the_mean_of_patches_at_random_places_is_the_ensemble():
     found = statistics.random_windows(300)
-    assert np.abs(found.patches.distance(found.ensemble)).max() < DISTANCE
-    assert np.all(found.patches.error < 0.09 * found.ensemble)
+    assert np.abs(found.distance).max() < DISTANCE
+    assert np.all(found.error < 0.09 * found.exact)
 
 
 def test_without_roughness_the_series_is_a_mirror():

@@ -1,26 +1,38 @@
-"""The rigorous solutions that are shipped: whole, converged, and the same by two methods."""
+"""The rigorous solutions that are stored: whole, converged, and the same by two methods."""
 
 from __future__ import annotations
 
+import itertools
 import sys
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-from docs.make.validation import coupled_wave, solutions, solve
-from docs.make.validation.agreement import agreement
+from docs.make.validation import coated, coupled_wave, filmed, solutions, solve
+from docs.make.validation.agreement import on_cells, on_gratings
 from docs.make.validation.cases import (
     FEW_WAVELENGTHS,
     MATERIALS,
-    PROFILES,
+    Case,
     Grating,
-    Scan,
+    Light,
+    Media,
+    grating_cases,
     index_of,
-    scans,
 )
-from docs.make.validation.solutions import CONVERGED, KEY, ROW, Solutions, load, save_rows, shipped
-from docs.make.validation.solve import main, solve_scan
+from docs.make.validation.patches import CELLS
+from docs.make.validation.solutions import (
+    CONVERGED,
+    DATA,
+    Orders,
+    Solutions,
+    Solved,
+    load,
+    save,
+    shipped,
+)
+from docs.make.validation.solve import main, solve_case
 from mitsuba_diffraction.errors import DiffractionError
 
 pytestmark = pytest.mark.thorough
@@ -28,63 +40,55 @@ pytestmark = pytest.mark.thorough
 gratinglab = pytest.mark.skipif(
     find_spec("gratinglab") is None, reason="gratinglab is not installed (extra `validation`)"
 )
-scatmech = pytest.mark.skipif(
-    find_spec("pySCATMECH") is None, reason="pySCATMECH is not installed (extra `validation`)"
-)
+KERATIN, PERFECT = Media("keratin"), Media("perfect")
 
 
-def rows_of(found: Solutions, scan: Scan) -> np.ndarray:
-    rows = found.rows
-    keep = rows["profile"] == PROFILES.index(scan.grating.profile)
-    for name, value in (
-        ("period", scan.grating.period),
-        ("depth", scan.grating.depth),
-        ("theta", scan.theta),
-    ):
-        keep &= rows[name] == np.float32(value)
-    return rows[keep & np.isin(rows["wavelength"], scan.wavelengths)]
+def needs(*modules: str):
+    missing = [name for name in modules if find_spec(name) is None]
+    return pytest.mark.skipif(bool(missing), reason=f"{missing} are not installed")
+
+
+def kept(file: str, case: Case) -> Solved:
+    found = load(DATA / f"{file}.npz", case.media).solved
+    return next(solved for solved in found if solved.case == case)
 
 
 @pytest.mark.parametrize("material", MATERIALS)
-def test_every_scan_is_there_and_nearly_all_of_it_has_converged(material):
+def test_every_case_is_there_and_nearly_all_of_them_have_converged(material):
     every = shipped(material)
-    for scan in scans(material):
-        found = np.unique(rows_of(every, scan)["wavelength"])
-        assert tuple(found) == scan.wavelengths
-    assert np.median(every.change) < 1e-4
-    assert np.mean(every.change > 1e-3) < 0.05
-    assert np.mean(every.converged) > 0.99
+    assert {solved.case for solved in every.solved} == set(grating_cases(material))
+    change = every.column("change").max(axis=1)
+    assert np.median(change) < 1e-4
+    assert np.mean(change > 1e-3) < 0.05
+    assert len(every.trusted().column("order")) > 0.99 * len(change)
 
 
 def test_a_solution_with_one_order_that_has_not_converged_is_left_out_as_a_whole():
-    rows = shipped("keratin").rows.copy()
-    rows["tm_change"][7] = 2 * CONVERGED
-    same = np.all([rows[name] == rows[name][7] for name in KEY], axis=0)
-    assert 1 < same.sum() < len(rows)
-    changed = Solutions(rows, {})
-    assert np.array_equal(~changed.converged, same)
-    assert changed.trusted().rows.tobytes() == rows[~same].tobytes()
+    first, *others = shipped("keratin").solved
+    assert len(first.order) > 1
+    first.change[0, 1] = 2 * CONVERGED
+    assert Solutions([first, *others]).trusted().solved == others
 
 
 @pytest.mark.parametrize("material", MATERIALS)
 def test_energy_is_conserved(material):
     every = shipped(material).trusted()
     # a theorem, which the meshes meet as well as they converge
-    assert every.balance.max() < 2 * CONVERGED
+    assert np.nanmax(np.abs(every.column("balance"))) < 2 * CONVERGED
     if material == "perfect":
-        rows = every.rows
-        _, inverse = np.unique(rows[KEY], return_inverse=True)
-        for polarisation in ("te", "tm"):
-            total = np.bincount(inverse.ravel(), rows[polarisation])
-            assert np.abs(total - 1).max() < 2 * CONVERGED  # no order is missing
+        total = np.array([solved.powers.sum(axis=0) for solved in every.solved])
+        assert np.abs(total - 1).max() < 2 * CONVERGED  # no order is missing
 
 
 def test_two_methods_agree():
-    found = agreement()
-    assert len(found) >= 10
-    for part in found:
+    on_lines = on_gratings()
+    assert len(on_lines) >= 10
+    for part in on_lines:
         # what is left is within the second method's own change, or the first one's
         assert part.largest < max(2 * part.own_change, 2 * CONVERGED), part.label
+    for part in on_cells():
+        assert part.deviation < part.second_change, part.case
+        assert part.first_change < 0.005, part.case
 
 
 def test_aluminium_is_mitsuba_s(some_variant):
@@ -100,65 +104,87 @@ def test_aluminium_is_mitsuba_s(some_variant):
             assert np.interp(wavelength, nodes, values) == pytest.approx(value, abs=6e-4)  # rounded
 
 
-@gratinglab
+FILM = "oxide on aluminium"
+
+
 @pytest.mark.parametrize(
-    ("grating", "material", "theta"),
+    ("file", "solver", "case", "resolutions", "tolerance"),
     [
-        (Grating("sinusoidal", 2.5, 0.1), "perfect", 30.0),
-        (Grating("blazed", 1.1, 0.2), "perfect", -30.0),
-        (Grating("lamellar", 1.1, 0.1), "keratin", 30.0),
+        # coarser meshes: corners are worth up to a few 1e-3 of the light then
+        *(
+            pytest.param(
+                f"{media.material}_integral", "integral",
+                Case(grating, Light(610.0, theta), media), (100, 140), 3e-3,
+                marks=needs("gratinglab"),
+            )
+            for grating, media, theta in (
+                (Grating("sinusoidal", 2.5, 0.1), PERFECT, 30.0),
+                (Grating("blazed", 1.1, 0.2), PERFECT, -30.0),
+                (Grating("lamellar", 1.1, 0.1), KERATIN, 30.0),
+            )
+        ),
+        pytest.param(
+            "keratin_patches_coupled_wave", "patches_coupled_wave",
+            Case(CELLS["sinusoid 2.5/0.05 µm"], Light(550.0, 60.0, 45.0), KERATIN), None, 1e-5,
+            marks=needs("grcwa"),
+        ),
+        (
+            filmed.file_of(FILM), "films",
+            Case(filmed.GRATINGS[3], Light(460.0, 60.0), filmed.FILMS[FILM]), None, 1e-7,
+        ),
+        *(
+            (file, "coated", Case(coated.GRATINGS[2], Light(610.0, 30.0), media), None, 1e-6)
+            for file, media in coated.COATS.items()
+        ),
     ],
-)
-def test_the_integral_method_gives_the_shipped_solutions_again(grating, material, theta):
-    scan = Scan(grating, material, theta, (610.0,))
-    again = solve_scan(scan, (100, 140))
-    stored = rows_of(shipped(material), scan)
-    for polarisation in ("te", "tm"):
-        # a coarser mesh: corners are worth up to a few 1e-3 of the light then
-        assert again[polarisation] == pytest.approx(stored[polarisation], abs=3e-3)
+)  # fmt: skip
+def test_a_solver_gives_what_is_stored_again(file, solver, case, resolutions, tolerance):
+    again, stored = solve_case(case, resolutions, solver=solver), kept(file, case)
+    assert np.array_equal(again.order, stored.order)
+    assert again.powers == pytest.approx(stored.powers, abs=tolerance)
+    if solver.startswith("patches"):
+        assert again.jones == pytest.approx(stored.jones, abs=tolerance)
 
 
-@scatmech
-def test_coupled_waves_give_the_shipped_solutions_again():
-    scan = Scan(Grating("blazed", 1.1, 0.4), "keratin", -30.0, (610.0,))
-    first, _ = coupled_wave.resolutions(scan)
-    again = coupled_wave.solve(scan, first)
-    stored = rows_of(shipped("keratin", "coupled_wave"), scan)
-    for polarisation in ("te", "tm"):
-        # the resolution from which the stored change is counted; that is stored in half floats
-        change = np.abs(again.orders[polarisation][0] - stored[polarisation])
-        assert change == pytest.approx(stored[f"{polarisation}_change"], rel=2e-3, abs=1e-7)
+@needs("pySCATMECH")
+def test_coupled_waves_give_the_stored_solutions_again():
+    case = Case(Grating("blazed", 1.1, 0.4), Light(610.0, -30.0), KERATIN)
+    again = coupled_wave.solve(case, coupled_wave.resolutions(case)[0])
+    stored = kept("keratin_coupled_wave", case)
+    # the resolution from which the stored change is counted; that was stored in half floats
+    change = np.abs(again.powers - stored.powers)
+    assert change == pytest.approx(stored.change, rel=2e-3, abs=1e-7)
 
 
 @gratinglab
 def test_what_has_not_converged_is_solved_again_on_a_finer_mesh(monkeypatch):
     # short walls in grazing light, and a strict limit, so that coarse meshes do for the test
     monkeypatch.setattr(solutions, "CONVERGED", 1e-3)
-    scan = Scan(Grating("lamellar", 2.5, 0.05), "perfect", 75.0, (410.0, 510.0))
-    twice = Solutions(solve_scan(scan, (100, 200)), {})
-    assert not twice.converged.any()
-    thrice = Solutions(solve_scan(scan, (100, 200, 300)), {})
-    expected = solve_scan(scan, (200, 300))
-    assert thrice.rows.tobytes() == expected.tobytes()
+    case = Case(Grating("lamellar", 2.5, 0.05), Light(410.0, 75.0), PERFECT)
+    twice = solve_case(case, (100, 200))
+    assert not twice.converged
+    thrice, expected = solve_case(case, (100, 200, 300)), solve_case(case, (200, 300))
+    for name in ("powers", "change"):
+        assert np.array_equal(getattr(thrice, name), getattr(expected, name))
     # what has converged is left as it is
-    easy = Scan(Grating("sinusoidal", 2.5, 0.05), "perfect", 0.0, (610.0,))
-    assert solve_scan(easy, (60, 80, 5)).tobytes() == solve_scan(easy, (60, 80)).tobytes()
+    easy = Case(Grating("sinusoidal", 2.5, 0.05), Light(610.0, 0.0), PERFECT)
+    long, short = (solve_case(easy, levels) for levels in ((60, 80, 5), (60, 80)))
+    assert np.array_equal(long.powers, short.powers)
 
 
 @gratinglab
 def test_the_command_solves_and_saves(tmp_path, monkeypatch, capsys):
     few = [
-        Scan(Grating("sinusoidal", 1.1, depth), "perfect", 30.0, (610.0,)) for depth in (0.1, 0.2)
+        Case(Grating("sinusoidal", 1.1, depth), Light(610.0, 30.0), PERFECT) for depth in (0.1, 0.2)
     ]
-    monkeypatch.setattr(solve, "scans", lambda material: few)
+    monkeypatch.setattr(solve, "grating_cases", lambda material: few)
     assert main(["perfect_integral", "-j", "1", "-o", str(tmp_path)]) == 0
     assert "perfect_integral.npz" in capsys.readouterr().out
-    found = load(tmp_path / "perfect_integral.npz")
+    found = load(tmp_path / "perfect_integral.npz", PERFECT)
     assert "gratinglab" in found.about["solver"]
-    stored = np.concatenate([rows_of(shipped("perfect"), scan) for scan in few])
-    for name in ("order", "te", "tm"):
+    for solved, case in zip(found.solved, few, strict=True):
         # the same mesh; another BLAS rounds otherwise
-        assert found.rows[name] == pytest.approx(stored[name], abs=1e-6)
+        assert solved.powers == pytest.approx(kept("perfect_integral", case).powers, abs=1e-6)
 
 
 def test_a_solver_that_is_missing_is_named(monkeypatch, tmp_path, capsys):
@@ -171,14 +197,25 @@ def test_a_solver_that_is_missing_is_named(monkeypatch, tmp_path, capsys):
 
 
 def test_what_was_saved_is_loaded(tmp_path):
-    rows = np.zeros(3, ROW)
-    rows["te"], rows["tm"], rows["te_change"] = 0.5, np.nan, 0.25
+    order = np.array([[0, 0], [1, -1]])
+    powers = np.array([[0.5, np.nan], [0.25, 0.125]])
+    cases = [
+        Case(surface, Light(550.0, 30.0, 45.0), KERATIN)
+        for surface in (Grating("blazed", 1.1, 0.05), CELLS["crossed grating"])
+    ]
+    coarse, fine = Orders(order[:1], powers[:1]), Orders(order, powers, jones=np.ones((2, 2, 2)))
+    made = [Solved.between(case, coarse, fine) for case in cases]
     path = tmp_path / "x.npz"
-    save_rows(rows, {"solver": "none"}, path)
-    loaded = load(path)
+    save(made, {"solver": "none"}, path)
+    loaded = load(path, KERATIN)
     assert loaded.about == {"solver": "none"}
-    assert loaded.rows.tobytes() == rows.tobytes()
-    assert np.all(loaded.change == 0.25)
+    for (case, solved), name in itertools.product(
+        zip(cases, loaded.solved, strict=True), ("order", "powers", "jones")
+    ):
+        assert solved.case == case
+        assert np.array_equal(getattr(solved, name), getattr(fine, name), equal_nan=True)
+        # an order that the coarse resolution lacks is new
+        assert np.array_equal(solved.change, [[0, np.nan], powers[1]], equal_nan=True)
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip"])
@@ -186,13 +223,13 @@ def test_a_file_that_holds_no_solutions_is_refused(tmp_path, content):
     path = tmp_path / "x.npz"
     path.write_bytes(content)
     with pytest.raises(DiffractionError, match="cannot read solutions"):
-        load(path)
+        load(path, KERATIN)
 
 
 def test_what_does_not_exist_is_refused_in_one_line():
     for call, text in (
         (lambda: shipped("gold"), "material 'gold' is unknown"),
-        (lambda: scans("gold"), "material 'gold' is unknown"),
+        (lambda: grating_cases("gold"), "material 'gold' is unknown"),
         (lambda: Grating("wavy", 1.0, 0.1).heights(), "profile 'wavy' is unknown"),
     ):
         with pytest.raises(DiffractionError, match=text) as error:

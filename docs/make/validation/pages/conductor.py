@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ..cases import PROBE_GRATING, Grating
-from ..compare import angles_of, table_of
-from ..limits import rms_slope
+from ..compare import Comparison, angles_of, table_of
 from .markdown import angle, percent, table
 from .measurements import Measurements
 
@@ -24,9 +23,9 @@ def _probe(measured: Measurements) -> str:
     grating = Grating(*PROBE_GRATING)
     part = measured.perfect.where(grating=grating)
     straight = part.where(theta=0.0)
-    wavelength = straight.solutions.rows["wavelength"]
-    to_550 = straight.select(wavelength <= 550).largest_relative()
-    from_450 = straight.select(wavelength >= 450).largest_relative()
+    wavelengths = sorted({solved.case.light.wavelength for solved in straight.solved})
+    to_550 = max(_relative(straight, w) for w in wavelengths if w <= 550)
+    from_450 = max(_relative(straight, w) for w in wavelengths if w >= 450)
     rows = []
     for theta in angles_of(part):
         at = part.where(theta=theta)
@@ -37,13 +36,17 @@ def _probe(measured: Measurements) -> str:
     ]  # fmt: skip
     return f"""## A gentle sinusoid
 
-Period {grating.period:g} µm, depth {grating.depth:g} µm, RMS slope {rms_slope(grating):.3f},
+Period {grating.period:g} µm, depth {grating.depth:g} µm, RMS slope {grating.field.rms_slope:.3f},
 unpolarised light. At normal incidence the relative error of the orders −2 to 2 is at most
-{percent(to_550)} up to 550 nm, and {percent(from_450)} from 450 to {wavelength.max():g} nm.
+{percent(to_550)} up to 550 nm, and {percent(from_450)} from 450 to {wavelengths[-1]:g} nm.
 
 {table(header, rows)}
 
 ![Efficiencies of three gratings against wavelength](../images/validation_orders.png)"""
+
+
+def _relative(part: Comparison, wavelength: float) -> float:
+    return part.where(wavelength=wavelength).largest_relative()
 
 
 def _polarisation(measured: Measurements) -> str:

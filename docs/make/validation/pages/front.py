@@ -6,21 +6,20 @@ import numpy as np
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
-from ..cells import chosen
 from ..compare import GRAZING, gratings_of, table_of
-from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope
-from ..models import ANGLES, of_colours
+from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT
+from ..models import ANGLES, of_cells, of_colours
 from .markdown import percent, table
 from .measurements import Measurements
 
 #: Kinds of cells in two dimensions: name in the table, kinds of `patches.KINDS`, slope, material.
 _CELLS = (
-    ("keratin, cuts of scales, slope 0.2", ("elaphe", "elaphe_like"), 0.2, "keratin"),
-    ("keratin, cuts of scales, slope 0.09", ("elaphe", "elaphe_like"), 0.09, "keratin"),
-    ("keratin, CD's pits, slope 0.2", ("cd_pits",), 0.2, "keratin"),
-    ("keratin, CD's pits, slope 0.06", ("cd_pits",), 0.06, "keratin"),
-    ("aluminium, cuts of scales, slope 0.09", ("elaphe", "elaphe_like"), 0.09, "aluminium"),
-    ("aluminium, CD's pits, slope 0.06", ("cd_pits",), 0.06, "aluminium"),
+    ("keratin, cuts of scales, slope 0.2", ["elaphe", "elaphe_like"], 0.2, "keratin"),
+    ("keratin, cuts of scales, slope 0.09", ["elaphe", "elaphe_like"], 0.09, "keratin"),
+    ("keratin, CD's pits, slope 0.2", ["cd_pits"], 0.2, "keratin"),
+    ("keratin, CD's pits, slope 0.06", ["cd_pits"], 0.06, "keratin"),
+    ("aluminium, cuts of scales, slope 0.09", ["elaphe", "elaphe_like"], 0.09, "aluminium"),
+    ("aluminium, CD's pits, slope 0.06", ["cd_pits"], 0.06, "aluminium"),
 )
 #: Largest depth/period of walls that count as low.
 _LOW = 0.08
@@ -79,10 +78,10 @@ def _gratings(measured: Measurements) -> list[list[object]]:
         walls = [g for p in ("lamellar", "blazed") for g in gratings_of(default, p)]
         groups = {
             f"sinusoidal, slope up to {GENTLE_SLOPE:g}": [
-                g for g in sinusoids if rms_slope(g) <= GENTLE_SLOPE
+                g for g in sinusoids if g.field.rms_slope <= GENTLE_SLOPE
             ],
             f"sinusoidal, slope {GENTLE_SLOPE:g} to {STEEP_SLOPE:g}": [
-                g for g in sinusoids if GENTLE_SLOPE < rms_slope(g) <= STEEP_SLOPE
+                g for g in sinusoids if GENTLE_SLOPE < g.field.rms_slope <= STEEP_SLOPE
             ],
             f"walls, depth/period up to {_LOW:g}": [g for g in walls if g.depth <= _LOW * g.period],
             f"walls, depth/period above {_LOW:g}": [g for g in walls if g.depth > _LOW * g.period],
@@ -101,20 +100,19 @@ def _gratings(measured: Measurements) -> list[list[object]]:
 
 def _cells(measured: Measurements) -> list[list[object]]:
     rows = []
-    for name, kinds, slope, material in _CELLS:
-        same = chosen(measured.cells, kinds, slope, material)
-        oblique = [c.by_model for c in same if c.case.theta == 60.0]
-        if not oblique:
+    for name, kind, slope, material in _CELLS:
+        kirchhoff, *default = (
+            of_cells(measured.cells[material, model], kind=kind, slope=slope, theta=theta)
+            for model, theta in (
+                ("kirchhoff", 60.0),
+                *(("small_slope", a) for a in (60.0, 0.0, 30.0)),
+            )
+        )
+        if not kirchhoff:
             continue
-        columns = [
-            _mean_and_worst(np.array([by_model[model] for by_model in oblique]))
-            for model in ("kirchhoff", "small_slope")
-        ]
-        steeper = [
-            [c.by_model["small_slope"] for c in same if c.case.theta == a] for a in (0.0, 30.0)
-        ]
-        means = [percent(float(np.mean(values))) if values else "–" for values in steeper]
-        rows.append([name, len(oblique), *columns, *means])
+        columns = [_mean_and_worst(np.array(values)) for values in (kirchhoff, default[0])]
+        means = [percent(float(np.mean(values))) if values else "–" for values in default[1:]]
+        rows.append([name, len(kirchhoff), *columns, *means])
     return rows
 
 

@@ -9,7 +9,7 @@ from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 from .. import goals, models
 from ..cases import Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of
-from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope, slope_limit
+from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, slope_limit
 from .markdown import angle, beside, percent, table
 from .measurements import Measurements
 
@@ -71,11 +71,13 @@ def _slopes(measured: Measurements) -> str:
     rows = [
         [
             f"{material}, {grating.period:g}/{grating.depth:g} µm",
-            f"{rms_slope(grating):.3f}",
+            f"{grating.field.rms_slope:.3f}",
             *_side_by_side(kirchhoff[material], default[material], grating, models.ANGLES),
         ]
         for material in default
-        for grating in sorted(gratings_of(default[material], "sinusoidal"), key=rms_slope)
+        for grating in sorted(
+            gratings_of(default[material], "sinusoidal"), key=lambda g: g.field.rms_slope
+        )
     ]
     header = ["sinusoid", "RMS slope", *map(angle, models.ANGLES)]
     parts = list(default.values())

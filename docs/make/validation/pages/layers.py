@@ -46,11 +46,9 @@ def _film(measured: Measurements) -> str:
     rows = []
     for film in measured.films:
         for grating, *by_model in zip(GRATINGS, film.kirchhoff, film.default, strict=True):
-            rows.append(
-                [film.stack.name, f"{grating.period:g}/{grating.depth:g} µm", *beside(*by_model)]
-            )
-    stacks = [film.stack for film in measured.films]
-    sizes = [[s.name, f"{s.film:g}", f"{s.thickness:g} nm"] for s in stacks]
+            rows.append([film.name, f"{grating.period:g}/{grating.depth:g} µm", *beside(*by_model)])
+    layers = [(film.name, *(film.media.film or ())) for film in measured.films]
+    sizes = [[name, f"{index:g}", f"{thickness:g} nm"] for name, index, thickness in layers]
     thick = [[f"{b.thickness:g} nm", f"2.5/{b.depth:g} µm", percent(b.deviation)] for b in beyond()]
     worst = max(film.default.max() for film in measured.films)
     return f"""## Under a film

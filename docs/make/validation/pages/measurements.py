@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from .. import cells, coated, filmed, models, statistics
+from .. import coated, filmed, models, statistics
 from ..cases import FEW_WAVELENGTHS
-from ..compare import Comparison, compare
-from ..goals import Sides
+from ..compare import Comparison, Sides, compare
 from ..patches import KINDS
-from ..solutions import shipped
+from ..solutions import Solutions, shipped
 
 
 @dataclass(frozen=True)
@@ -27,15 +26,13 @@ class Measurements:
     @cached_property
     def perfect(self) -> Comparison:
         """Kirchhoff's model on gratings of a perfect conductor."""
-        return self._compare("perfect")
+        return compare(self._solutions("perfect"))
 
     @cached_property
     def by_model(self) -> Sides:
         """Comparison of each material and model on gratings."""
-        materials = {name: self._compare(name) for name in models.MATERIALS}
-        if self.quick:
-            materials = {m: part.where(period=2.5, depth=0.1) for m, part in materials.items()}
-        return models.compare_all(materials)
+        chosen = {"period": 2.5, "depth": 0.1} if self.quick else {}
+        return models.compare_all({m: self._solutions(m, **chosen) for m in models.MATERIALS})
 
     @cached_property
     def kirchhoff(self) -> dict[str, Comparison]:
@@ -48,10 +45,11 @@ class Measurements:
         return {material: self.by_model[material, "small_slope"] for material in models.MATERIALS}
 
     @cached_property
-    def cells(self) -> list[cells.PatchComparison]:
-        """Comparisons on cells in two dimensions, of both materials."""
-        kinds = KINDS[: self.most(1)]
-        return [c for m in models.MATERIALS for c in cells.compared(m, kinds)]
+    def cells(self) -> Sides:
+        """Comparison of each material and model on cells in two dimensions."""
+        chosen = {"kind": KINDS[0]} if self.quick else {}
+        solved = {m: shipped(m, "patches_rayleigh").where(**chosen) for m in models.MATERIALS}
+        return models.compare_all(solved)
 
     @cached_property
     def coats(self) -> list[coated.CoatDeviation]:
@@ -61,7 +59,7 @@ class Measurements:
     @cached_property
     def films(self) -> list[filmed.FilmDeviations]:
         """Deviations of gratings under each film."""
-        return [filmed.of_stack(stack) for stack in filmed.STACKS[: self.most(1)]]
+        return [filmed.deviations(film) for film in list(filmed.FILMS)[: self.most(1)]]
 
     @cached_property
     def statistics(self) -> statistics.Statistics:
@@ -72,8 +70,6 @@ class Measurements:
         """How many cases of a list are measured: all, or `count` if quick."""
         return count if self.quick else None
 
-    def _compare(self, material: str) -> Comparison:
-        every = shipped(material)
-        return compare(
-            material, every.where(wavelength=FEW_WAVELENGTHS[0]) if self.quick else every
-        )
+    def _solutions(self, material: str, **chosen: object) -> Solutions:
+        every = shipped(material).where(**chosen)
+        return every.where(wavelength=FEW_WAVELENGTHS[0]) if self.quick else every

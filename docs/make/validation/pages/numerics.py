@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..cases import PROFILES, Grating
 from ..closed_forms import ANGLES, deviations
@@ -47,17 +46,18 @@ a period. The errors of lamellar and blazed gratings come from sampling.
 def _random_surfaces(measured: Measurements) -> str:
     specular, offsets = measured.statistics.specular, measured.statistics.offsets
     estimates = zip(
-        specular.kappa_rms, specular.power.mean, specular.power.error, specular.exact, strict=True
-    )
+        specular.places, specular.mean, specular.error, specular.exact, specular.distance,
+        strict=True,
+    )  # fmt: skip
     rows = [
-        [f"{x:g}", f"{mean:.4f} ± {error:.4f}", f"{exact:.4f}", f"{(mean - exact) / error:+.1f}"]
-        for x, mean, error, exact in estimates
+        [f"{x:g}", f"{mean:.4f} ± {error:.4f}", f"{exact:.4f}", f"{distance:+.1f}"]
+        for x, mean, error, exact, distance in estimates
     ]
-    lobes = []
-    for lobe in measured.statistics.lobes:
-        name = f"{1000 * lobe.roughness.rms:g} nm"
-        lobes.append([name, *_distances(lobe.measured.distance(lobe.exact))])
-    lobes.append(["mean of patches", *_distances(offsets.patches.distance(offsets.ensemble))])
+    lobes = [
+        [each.name, len(z := each.distance), f"{np.sqrt(np.mean(z**2)):.2f}",
+         f"{np.abs(z).max():.1f}"]
+        for each in (*measured.statistics.lobes.values(), offsets)
+    ]  # fmt: skip
     return f"""## Random surfaces
 
 Gaussian heights with the autocorrelation rms²·exp(−r²/T²), beside exp(−(κ·rms)²) with scattered
@@ -66,13 +66,9 @@ light in the bin (order 0, left), the series of Beckmann and Spizzichino (lobes,
 
 ![Specular loss, scattered lobes, and the mean of patches](../images/validation_statistics.png)
 
-{table(["κ·rms", f"mean of {specular.surfaces} surfaces", "exact", "in standard errors"], rows)}
+{table(["κ·rms", f"mean of {specular.count} surfaces", "exact", "in standard errors"], rows)}
 
 Differences of lobes and of the mean of patches, in standard errors; the expected root-mean-square
 is 1.
 
 {table(["rms", "directions", "root-mean-square", "largest"], lobes)}"""
-
-
-def _distances(z: NDArray[np.float64]) -> list[object]:
-    return [len(z), f"{np.sqrt(np.mean(z**2)):.2f}", f"{np.abs(z).max():.1f}"]

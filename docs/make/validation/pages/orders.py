@@ -12,7 +12,7 @@ from .measurements import Measurements
 
 def write(measured: Measurements) -> str:
     """Write the page."""
-    cases = [orders.Case(name) for name in orders.TABLES[: measured.most(1)]]
+    cases = [orders.Shipped(name) for name in orders.TABLES[: measured.most(1)]]
     mounts = orders.MOUNTS[: measured.most(1)]
     samples = measured.most(4) or orders.SAMPLES
     diffuse = [
@@ -68,7 +68,7 @@ printed digits, or the error of the printed method.
 Measured gratings: [measured.md](measured.md)."""
 
 
-def _deviations(cases: Sequence[orders.Case], mounts: Sequence[tuple[int, int]]) -> str:
+def _deviations(cases: Sequence[orders.Shipped], mounts: Sequence[tuple[int, int]]) -> str:
     rows = []
     for case in cases:
         for theta, phi in mounts:
@@ -81,12 +81,11 @@ def _deviations(cases: Sequence[orders.Case], mounts: Sequence[tuple[int, int]])
     return table(header, rows)
 
 
-def _side_by_side(cases: Sequence[orders.Case], mounts: Sequence[tuple[int, int]]) -> str:
+def _side_by_side(cases: Sequence[orders.Shipped], mounts: Sequence[tuple[int, int]]) -> str:
     rows = []
     for case in cases:
         for theta, phi in mounts:
-            row = case.side_by_side(theta, phi)
-            for order, *values in zip(row.order, row.model, row.table, row.truth, strict=True):
+            for order, *values in case.side_by_side(theta, phi):
                 number = f"{order}".replace("-", "−")
                 rows.append([case.name, f"{theta}°, {phi}°", number, *(f"{v:.4f}" for v in values)])
     return table(["table", "θ, φ", "order", "default", "solved", "truth"], rows)

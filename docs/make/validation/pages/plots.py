@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,11 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
-from ..cases import PROFILES, Grating
+from ..cases import PROFILES, Case, Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of
-from ..limits import GENTLE_ERROR, STEEP_ERROR, rms_slope
+from ..limits import GENTLE_ERROR, STEEP_ERROR
 from ..models import of_colours
-from ..statistics import Statistics
+from ..statistics import CORRELATION, THETA, WAVELENGTH, Statistics, exact_lobe
 from .markdown import percent
 
 _SMALLEST = 1e-4  # deviations below it are drawn on it
@@ -27,7 +28,7 @@ def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Compariso
     figure, axes = _figure(11.5, 4.8, len(default))
     for panel, (material, blend) in zip(axes, default.items(), strict=True):
         sinusoids = gratings_of(blend, "sinusoidal")
-        slopes = np.array([rms_slope(grating) for grating in sinusoids])
+        slopes = np.array([grating.field.rms_slope for grating in sinusoids])
         angles = angles_of(blend.where(profile="sinusoidal"))
         for part, marker, fill, name in (
             (kirchhoff[material], "s", "none", "Kirchhoff"),
@@ -69,21 +70,19 @@ def orders_figure(comparison: Comparison, gratings: list[Grating], theta: float)
     figure, axes = _figure(4.6 * len(gratings), 4.4, len(gratings))
     for panel, grating in zip(axes, gratings, strict=True):
         part = comparison.where(grating=grating, theta=theta)
-        rows = part.solutions.rows
+        numbers = part.order[:, 0]
+        lights = _of_orders(part, lambda case: case.light.wavelength)
         strongest = sorted(
-            {int(m) for m in rows["order"]},
-            key=lambda m: -float(part.rigorous[rows["order"] == m].max()),
+            set(numbers.tolist()), key=lambda m: -float(part.rigorous[numbers == m].max())
         )
         if theta == 0.0 and grating.profile != "blazed":  # ±m are equal
             strongest = [m for m in strongest if m >= 0]
         for n, order in enumerate(sorted(strongest[:3])):
-            of_order = rows["order"] == order
-            at = np.argsort(rows["wavelength"][of_order])
-            wavelength = rows["wavelength"][of_order][at]
-            colour = f"C{n}"
-            for polarisation, style in (("te", "--"), ("tm", ":")):
-                panel.plot(wavelength, rows[polarisation][of_order][at], style, color=colour, lw=1)
-            mean, model = part.rigorous[of_order][at], part.model[of_order][at]
+            of_order = numbers == order
+            wavelength, colour = lights[of_order], f"C{n}"
+            for column, style in zip(part.exact[of_order].T, ("--", ":"), strict=True):
+                panel.plot(wavelength, column, style, color=colour, lw=1)
+            mean, model = part.rigorous[of_order], part.model[of_order]
             panel.plot(wavelength, mean, "-", color=colour, label=f"m = {order}")
             panel.plot(wavelength, model, "o", color=colour, ms=5, mfc="none")
         panel.set(
@@ -99,17 +98,19 @@ def orders_figure(comparison: Comparison, gratings: list[Grating], theta: float)
     return figure
 
 
-def scatter_figure(comparisons: list[Comparison]) -> Figure:
+def scatter_figure(comparisons: dict[str, Comparison]) -> Figure:
     """Every order's efficiency by the model against the rigorous one, by material and profile."""
     figure, axes = _figure(4.4 * len(comparisons), 4.6, len(comparisons))
-    for panel, comparison in zip(axes, comparisons, strict=True):
+    for panel, (material, comparison) in zip(axes, comparisons.items(), strict=True):
         counted = comparison.counted
-        profile = comparison.solutions.rows["profile"]
-        gentle = _gentle(comparison)
+        ratio = _of_orders(comparison, lambda case: case.surface.depth / case.surface.period)
+        theta = _of_orders(comparison, lambda case: case.light.theta)
+        gentle = (ratio <= _GENTLE_RATIO) & (np.abs(theta) <= 30)
+        profile = _of_orders(comparison, lambda case: case.surface.profile)
         # edges first: sinusoids would lie beneath them
         for n, name in reversed(list(enumerate(PROFILES))):
             for keep, marker, alpha in ((~gentle, ".", 0.15), (gentle, "o", 0.7)):
-                chosen = counted & (profile == n) & keep
+                chosen = counted & (profile == name) & keep
                 label = name if marker == "o" else None
                 panel.loglog(
                     comparison.rigorous[chosen], comparison.model[chosen], marker, color=f"C{n}",
@@ -118,7 +119,7 @@ def scatter_figure(comparisons: list[Comparison]) -> Figure:
         low, high = 1e-6, 1.5
         panel.plot([low, high], [low, high], color="black", lw=0.8)
         panel.set(
-            xlim=(low, high), ylim=(low, high), title=_MODEL_OF[comparison.material],
+            xlim=(low, high), ylim=(low, high), title=_MODEL_OF[material],
             xlabel="rigorous efficiency", ylabel="model",
         )  # fmt: skip
         panel.set_aspect("equal")
@@ -144,37 +145,34 @@ def _specular(axes: Axes, statistics: Statistics) -> None:
     axes.semilogy(x, np.exp(-(x**2)), color="black", lw=1, label="exp(−(κ·rms)²)")
     points = statistics.specular
     axes.errorbar(
-        points.kappa_rms, points.power.mean, 2 * points.power.error, fmt="o", ms=4,
-        label=f"{points.surfaces} surfaces, ± 2 standard errors",
+        points.places, points.mean, 2 * points.error, fmt="o", ms=4,
+        label=f"{points.count} surfaces, ± 2 standard errors",
     )  # fmt: skip
-    axes.semilogy(points.kappa_rms, points.exact, "_", ms=14, color="C3", label="with scattering")
+    axes.semilogy(points.places, points.exact, "_", ms=14, color="C3", label="with scattering")
     axes.set(xlabel="κ·rms", ylabel="mean power of order 0, |a₀|²", title="specular loss")
     _frame(axes)
 
 
 def _lobes(axes: Axes, statistics: Statistics) -> None:
-    for n, lobe in enumerate(statistics.lobes):
-        axes.semilogy(lobe.fine_angles, lobe.fine_exact, color=f"C{n}", lw=1)
+    for n, (rms, lobe) in enumerate(statistics.lobes.items()):
+        fine = np.linspace(lobe.places.min(), lobe.places.max(), 400)
+        axes.semilogy(fine, exact_lobe(rms, fine), color=f"C{n}", lw=1)
         axes.errorbar(
-            lobe.angles, lobe.measured.mean, 2 * lobe.measured.error, fmt="o", ms=3,
-            color=f"C{n}", label=f"rms {1000 * lobe.roughness.rms:g} nm",
+            lobe.places, lobe.mean, 2 * lobe.error, fmt="o", ms=3, color=f"C{n}",
+            label=f"rms {lobe.name}",
         )  # fmt: skip
-    lobe = statistics.lobes[0]
     axes.set(
         xlabel="exit angle (°)", ylabel="BRDF (1/sr)", ylim=(1e-4, None),
-        title=f"incidence {lobe.theta:g}°, {lobe.wavelength:g} nm, T = "
-        f"{lobe.roughness.correlation:g} µm",
+        title=f"incidence {THETA:g}°, {WAVELENGTH:g} nm, T = {CORRELATION:g} µm",
     )  # fmt: skip
     _frame(axes)
 
 
 def _offsets(axes: Axes, statistics: Statistics) -> None:
     offsets = statistics.offsets
-    ratio = offsets.patches.mean / offsets.ensemble
+    ratio = offsets.mean / offsets.exact
     axes.axhline(1, color="black", lw=1)
-    axes.errorbar(
-        offsets.angles, ratio, 2 * offsets.patches.error / offsets.ensemble, fmt="o", ms=4
-    )
+    axes.errorbar(offsets.places, ratio, 2 * offsets.error / offsets.exact, fmt="o", ms=4)
     axes.set(
         xlabel="exit angle (°)", ylabel="mean of patches / ensemble, ± 2 standard errors",
         title=f"windows at {offsets.count} random places",
@@ -192,15 +190,15 @@ _MODEL_OF = {
 _GENTLE_RATIO = 0.05  # depth/period; of a sinusoid, an RMS slope of 0.11
 
 
-def _gentle(comparison: Comparison) -> NDArray[np.bool_]:
-    rows = comparison.solutions.rows
-    ratio = rows["depth"].astype(float) / rows["period"]
-    return (ratio <= _GENTLE_RATIO) & (np.abs(rows["theta"]) <= 30)
+def _of_orders(comparison: Comparison, value: Callable[[Case], Any]) -> NDArray[Any]:
+    """A value of the case of each order."""
+    solved = comparison.solved
+    return np.repeat([value(s.case) for s in solved], [len(s.order) for s in solved])
 
 
 def _title(grating: Grating) -> str:
     edges = grating.profile != "sinusoidal"  # with a slope beyond what pixels can tell
-    return str(grating) if edges else f"{grating}, RMS slope {rms_slope(grating):.2f}"
+    return str(grating) if edges else f"{grating}, RMS slope {grating.field.rms_slope:.2f}"
 
 
 def _frame(axes: Axes, **legend: Any) -> None:

@@ -52,7 +52,7 @@ _PICTURES: dict[str, tuple[str, Callable[[Measurements], Figure]]] = {
     "conductor": ("orders", lambda m: plots.orders_figure(m.perfect, list(_EXAMPLES), 30.0)),
     "solutions": (
         "materials",
-        lambda m: plots.scatter_figure([m.perfect, *m.default.values()]),
+        lambda m: plots.scatter_figure({"perfect": m.perfect, **m.default}),
     ),
     "numerics": ("statistics", lambda m: plots.statistics_figure(m.statistics)),
 }

@@ -49,7 +49,7 @@ def _crops(quick: bool) -> str:
     expected = [seen(own, spectrum, WIDTH, one.degrees, lam) for one in found]
     rows = [
         [
-            f"{one.degrees:g}°", f"{one.ratio:.2f} ± {one.error:.2f}", f"{one.worst:.2f}",
+            f"{one.degrees:g}°", f"{one.seen.ratio:.2f} ± {one.error:.2f}", f"{one.seen.worst:.2f}",
             f"{one.scatter:.2f}", f"{each.ratio:.2f}", f"{each.worst:.2f}",
         ]
         for one, each in zip(found, expected, strict=True)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..agreement import agreement
+from .. import crossed, rayleigh
+from ..agreement import on_cells, on_gratings
 from ..cases import MATERIALS, PERIODS
-from ..cells import agreements
-from ..patch_solutions import RESOLUTIONS, solved
 from ..solutions import CONVERGED, shipped
 from .markdown import joined, percent, table
 from .measurements import Measurements
@@ -43,15 +42,17 @@ def _gratings() -> str:
     rows = []
     for material in MATERIALS:
         every = shipped(material)
-        change = every.change
+        change = np.fmax(*every.column("change").T)
+        balance = np.fmax(*np.abs(every.column("balance")).T)
+        kept = sum(len(solved.order) for solved in every.trusted().solved) / len(change)
         rows.append(
             [
                 f"{material} ({every.about['index']})",
-                len({(row["profile"], row["period"], row["depth"]) for row in every.rows}),
+                len({solved.case.surface for solved in every.solved}),
                 len(change),
                 *(f"{value:.0e}" for value in (*np.quantile(change, (0.5, 0.99)), change.max())),
-                f"{every.balance.max():.0e}",
-                percent(1 - float(np.mean(every.converged))),
+                f"{balance.max():.0e}",
+                percent(1 - kept),
             ]
         )
     header = [
@@ -81,7 +82,7 @@ def _two_solvers() -> str:
             f"{part.strongest:.2g}",
             *(f"{value:.0e}" for value in (part.median, part.largest, part.own_change)),
         ]
-        for part in agreement()
+        for part in on_gratings()
     ]
     return f"""## Two solvers on gratings
 
@@ -93,19 +94,22 @@ solver's change when its orders and layers doubled:
 
 
 def _cells() -> str:
-    compared = agreements()
+    compared = on_cells()
     rows = []
-    for surface, wavelength in dict.fromkeys((a.case.surface, a.case.wavelength) for a in compared):
-        same = [a for a in compared if (a.case.surface, a.case.wavelength) == (surface, wavelength)]
+    for surface, wavelength in dict.fromkeys(
+        (a.case.surface, a.case.light.wavelength) for a in compared
+    ):
+        same = [a for a in compared if a.case.has(surface=surface, wavelength=wavelength)]
         worst = (
             max(getattr(a, name) for a in same)
             for name in ("deviation", "first_change", "second_change")
         )
-        rows.append([surface.name, f"{wavelength:g}", len(same), *map(percent, worst)])
-    (coarse,), (fine,) = RESOLUTIONS["rayleigh"][1]
-    (first, _), (second, _) = RESOLUTIONS["coupled_wave"][1]
+        rows.append([surface, f"{wavelength:g}", len(same), *map(percent, worst)])
+    crossing = next(a.case for a in compared if a.case.has(kind="crossed"))
+    coarse, fine = rayleigh.resolutions(crossing)
+    (first, _), (second, _) = crossed.resolutions(crossing)
     header = ["keratin", "nm", "directions", "difference", "change", "change, coupled waves"]
-    other = solved("keratin", "coupled_wave")[1]["solver"]
+    other = shipped("keratin", "patches_coupled_wave").about["solver"]
     return f"""## Two solvers in two dimensions
 
 Rayleigh's expansion, whose solutions the comparisons use, beside {other}. *Difference* is the

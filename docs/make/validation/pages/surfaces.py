@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from ..cells import PatchComparison
+from ..cases import Case
+from ..compare import Sides
+from ..models import COMPARED, of_cells
+from ..solutions import LIGHTS
 from .markdown import angle, percent, table
 from .measurements import Measurements
 
-_MODELS = ("kirchhoff", "small_slope_alone", "small_slope")
+_MODELS = COMPARED
 _POLARISED = ("kirchhoff", "small_slope")
 _ANGLES = (0.0, 30.0, 60.0)
 
@@ -40,36 +44,37 @@ Light from 60°, mean over the planes of incidence, as Kirchhoff / the default.
 {table(["surface", "nm", "s", "p"], list(_polarised(cells)))}"""
 
 
-def _unpolarised(cells: Sequence[PatchComparison]) -> Iterator[list[str]]:
-    for label, same in _by_surface(cells):
-        case = same[0].case
-        values = []
-        for theta in _ANGLES:
-            chosen = [c.by_model for c in same if c.case.theta == theta]
-            means = [_mean([c[model] for c in chosen]) for model in _MODELS]
-            values.append(" / ".join(map(percent, means)) if chosen else "–")
-        change = percent(max(c.change for c in same))
-        yield [label, f"{case.surface.slope:.2g}", f"{case.wavelength:g}", *values, change]
+def _unpolarised(cells: Sides) -> Iterator[list[object]]:
+    for label, case, chosen in _by_surface(cells):
+        kirchhoff = cells[case.media.material, "kirchhoff"].where(**chosen)
+        change = percent(max(part.change() for part in kirchhoff.each()))
+        values = [_means(cells, case, _MODELS, theta=theta, **chosen) for theta in _ANGLES]
+        cell = case.surface
+        yield [label, f"{cell.slope:.2g}", f"{case.light.wavelength:g}", *values, change]
 
 
-def _polarised(cells: Sequence[PatchComparison]) -> Iterator[list[str]]:
-    for label, same in _by_surface(cells):
-        oblique = [c.polarised for c in same if c.case.theta == 60.0]
-        means = (
-            " / ".join(percent(_mean([c[model][n] for c in oblique])) for model in _POLARISED)
-            for n in range(2)
-        )
-        yield [label, f"{same[0].case.wavelength:g}", *means]
+def _polarised(cells: Sides) -> Iterator[list[object]]:
+    for label, case, chosen in _by_surface(cells):
+        values = [_means(cells, case, _POLARISED, light, theta=60.0, **chosen) for light in LIGHTS]
+        yield [label, f"{case.light.wavelength:g}", *values]
 
 
-def _by_surface(cells: Sequence[PatchComparison]) -> Iterator[tuple[str, list[PatchComparison]]]:
-    """Name and cases of each material, surface and wavelength."""
-    groups: dict[tuple[object, ...], list[PatchComparison]] = {}
-    for c in cells:
-        groups.setdefault((c.case.material, c.case.surface, c.case.wavelength), []).append(c)
-    for same in groups.values():
-        yield f"{same[0].case.material}, {same[0].case.surface.name}", same
+def _by_surface(cells: Sides) -> Iterator[tuple[str, Case, dict[str, Any]]]:
+    """Name, a case and the values in common of each material, surface and wavelength."""
+    cases = [
+        s.case for (_, model), part in cells.items() for s in part.solved if model == _MODELS[0]
+    ]
+    for media, surface, wavelength in dict.fromkeys(
+        (case.media, case.surface, case.light.wavelength) for case in cases
+    ):
+        chosen = {"surface": surface, "wavelength": wavelength}
+        case = next(c for c in cases if c.has(media=media, **chosen))
+        yield f"{media.material}, {surface}", case, chosen
 
 
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values)) if values else np.nan
+def _means(
+    cells: Sides, case: Case, models: Sequence[str], light: str | None = None, **chosen: Any
+) -> str:
+    """Means over the planes of incidence by model."""
+    by_model = [of_cells(cells[case.media.material, model], light, **chosen) for model in models]
+    return " / ".join(percent(float(np.mean(v))) for v in by_model) if by_model[0] else "–"

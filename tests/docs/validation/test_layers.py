@@ -1,0 +1,91 @@
+"""Gratings under a coat and a film, and orders that go through: solvers, and the model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from docs.make.validation import coated, filmed, rayleigh, transmitted
+from docs.make.validation.cases import COAT, Case, Light, Media, Sampled, order_sines
+from docs.make.validation.model import modelled
+from docs.make.validation.solutions import stored
+from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.reference.fresnel import amplitudes
+
+
+def made(matrix: np.ndarray, *, once: bool = False) -> np.ndarray:
+    """What leaves of orders of 1.6 µm at 30° and 610 nm, TE."""
+    orders, sines = order_sines(1.6, 610.0, 30.0)
+    inside = coated.inner_orders(1.6, 610.0, 30.0)
+    face = np.abs(amplitudes(np.sqrt(1 - sines**2), COAT)[0]) ** 2
+    return coated.leaving(matrix, face, np.isin(inside, orders), orders, once=once)
+
+
+def test_of_a_structure_that_loses_nothing_all_light_leaves():
+    count = len(coated.inner_orders(1.6, 610.0, 30.0))
+    matrix = np.full((count, count), 1.0 / count)  # whatever comes down is spread evenly
+    assert made(matrix).sum() == pytest.approx(1.0, abs=1e-12)
+    assert made(matrix, once=True).sum() < 0.8
+
+
+def test_of_a_mirror_it_is_that_of_two_mirrors():
+    orders = order_sines(1.6, 610.0, 30.0)[0]
+    matrix = 0.9 * np.eye(len(coated.inner_orders(1.6, 610.0, 30.0)))
+    face = np.abs(amplitudes(np.cos(np.radians(30.0)), COAT)[0]) ** 2
+    out = made(matrix)
+    assert out[orders != 0] == pytest.approx(0.0)
+    assert out[orders == 0] == pytest.approx(face + (1 - face) ** 2 * 0.9 / (1 - 0.9 * face))
+
+
+@pytest.mark.parametrize("grating", coated.GRATINGS[:4], ids=str)
+def test_gentle_gratings_under_a_coat(grating):
+    for deviation in coated.deviations([grating]):
+        # refraction and transmission; half a per cent is the structure's own deviation
+        assert deviation.single < 0.005, deviation
+        # the model's bounces leave less than no bounces would
+        assert deviation.bounced < 0.85 * deviation.share, deviation
+        assert deviation.bounced < 0.1, deviation
+
+
+def test_a_film_of_air_is_the_bare_grating_of_the_reduced_expansion():
+    grating, light = filmed.GRATINGS[2], Light(610.0, 30.0)
+    under = filmed.solve(Case(grating, light, Media("aluminium", (1.0, 200.0))), 16)
+    bare = rayleigh.solve(Case(grating, light, Media("aluminium")), 31)
+    place = np.searchsorted(under.order[:, 0], bare.order[:, 0])
+    assert under.powers[place] == pytest.approx(bare.powers, abs=1e-9)
+
+
+@pytest.mark.parametrize("film", filmed.FILMS)
+def test_gratings_of_slope_up_to_a_tenth_under_a_film(film):
+    found = filmed.deviations(film)
+    solved = stored(filmed.file_of(film), found.media)
+    assert solved.column("change").max() < 1e-6
+    # thick lacquer lacks light that the rough faces diffract twice, which grows as heights squared
+    worst, gentle = (0.2, 0.02) if film.startswith("lacquer") else (0.1, 0.007)
+    assert found.default.max() < worst
+    assert found.default[0].max() < gentle  # of slope 0.03: first order is exact as heights go to 0
+    assert np.median(found.default / found.kirchhoff) < 0.3
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("grating", transmitted.GRATINGS[:4], ids=str)
+def test_colours_through_gratings_of_slope_up_to_a_tenth(grating):
+    for found in transmitted.deviations([grating]):
+        normal, *oblique = found.by_model[-1]
+        assert normal < 0.002
+        assert max(oblique) < 0.03
+
+
+@pytest.mark.thorough
+def test_on_a_surface_without_symmetry_orders_are_on_their_own_side():
+    x = np.arange(64) / 64 * 2 * np.pi
+    heights = 0.03 * np.cos(x) + 0.012 * np.sin(2 * x)
+    surface = Sampled(HeightField(np.tile(heights, (2, 1)), 2.5 / 64))
+    case = Case(surface, Light(550.0, 0.0), Media("keratin", through=True))
+    solution = rayleigh.solve(case, 31)
+    exact = solution.powers.mean(axis=1)
+    model = modelled(case, solution.order, "small_slope").mean(axis=1)
+    first = {int(m): n for n, m in enumerate(solution.order[:, 0])}
+    assert exact[first[1]] > 1.1 * exact[first[-1]]  # the sides differ
+    for order in (-1, 1):
+        assert model[first[order]] == pytest.approx(exact[first[order]], rel=2e-3)
