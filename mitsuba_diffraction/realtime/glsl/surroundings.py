@@ -74,7 +74,7 @@ def _places(triangles: Real) -> Iterator[Real]:
         chosen = triangles[parts == count]
         step = max(1, _AT_ONCE // len(weights))
         for start in range(0, len(chosen), step):
-            yield np.einsum("wc,ncx->nwx", weights, chosen[start : start + step]).reshape(-1, 3)
+            yield (weights @ chosen[start : start + step]).reshape(-1, 3)
 
 
 @dataclass(frozen=True)
