@@ -210,8 +210,10 @@ def _errors(
              for part, period in zip(orders.T, table.periods, strict=True)]  # fmt: skip
     out = x + shift[0], y + shift[1]
     known = (np.hypot(*out) <= np.hypot(x, y).max()) & others
-    forth = table.efficiency(*light)
-    back = np.where(known, table.efficiency(-out[0], -out[1], *light[2:]), forth)
+    # `efficiency` may be that of reversed light already
+    forth = got[0].mean(axis=-1)
+    reversed_ = table.polarised_efficiency(-out[0], -out[1], *light[2:])
+    back = np.where(known, reversed_.mean(axis=-1), forth)
     sent = float(forth[np.broadcast_to(known, forth.shape)].sum())
     reciprocity = float(np.abs(back - forth).sum()) / max(sent, 1e-12)
     return {**error.facts(), "reciprocity_error": reciprocity}

@@ -11,13 +11,11 @@ from scipy.spatial import KDTree
 from ..arrays import Complex, Real
 from ..errors import warn
 from .polarised import nearest_jones
-from .response import ListedResponse, orders_between
+from .response import STEEPEST, WIDEST_GAP, ListedResponse, orders_between
 from .table import OrderTable
 
 #: Decimals of degrees that tell directions apart.
 _DIGITS = 9
-#: Widest gap between azimuths of a crossed grating, degrees, that needs no warning.
-_WIDEST_GAP = 90.0
 #: Differences of directions (twice `polarised.MIN_ANGLE`), and relative ones of wavelengths, within
 #: which light is the listed one.
 _SAME, _SAME_WAVELENGTH = 4e-6, 1e-6
@@ -227,14 +225,14 @@ def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
     theta, phi = _canonical(lights, table.crossed)
     bearings = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
     if table.crossed:
-        if np.diff(bearings, append=bearings[0] + 360.0).max() > _WIDEST_GAP:
+        if np.diff(bearings, append=bearings[0] + 360.0).max() > WIDEST_GAP:
             warn(
                 f"{shown} has no light from some azimuths, which get the efficiencies of the "
                 "nearest direction in it; list phi from 0 to 345 in steps of 15"
             )
         return
     sides = {0.0, 180.0} <= set(bearings.tolist())
-    if theta.max() < 75.0 or not sides:
+    if theta.max() < STEEPEST or not sides:
         warn(
             f"{shown} has no light from some directions, which get the efficiencies of the nearest "
             "direction in it; list theta from -85 to 85 in steps of 5 or 10 to have all of them"
