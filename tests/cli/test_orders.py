@@ -62,6 +62,9 @@ def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
     assert (tmp_path / "grating.csv").read_text().startswith("theta_i_deg,")
     assert (tmp_path / "grating.bsdf").read_text("ascii").endswith("DataEnd\n")
     assert json.loads((tmp_path / "grating.brdf").read_text())["metadata"]["type"] == "BRDF"
+    dark = run("export-bsdf", "grating.nc", *grid[:4], "--wavelength", "550,900", "-o", "dark.csv")
+    assert "380 to 780 nm" in dark.err
+    assert not (tmp_path / "dark.csv").exists()
     refused = run("export-bsdf", "grating.nc", "--format", "bird", "-o", "x.bsdf")
     assert ".json or .brdf" in refused.err
     assert "no heights" in run("evaluate", "grating.nc").err
