@@ -20,7 +20,7 @@ from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .efficiency import jones_matrices
 from .file import add_variable
-from .listed import mirror_of
+from .listed import mirror_of, warn_of_other_directions
 from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, axes_of, check_light
 from .polarised import MIN_ANGLE
 from .response import ListedResponse, orders_between
@@ -99,7 +99,7 @@ def list_orders(
 
     Raises a DiffractionError if an angle or wavelength is out of its range, there are over two
     million lines, or the table has no s and p of conical light
-    (`OrderTable.polarised_efficiency`).
+    (`OrderTable.polarised_efficiency`). Warns of light outside the directions of a list.
 
     Parameters
     ----------
@@ -120,6 +120,7 @@ def list_orders(
             f"wavelengths from {lights[0][0]:g} to {lights[0][-1]:g} nm: the table has {low:g} to "
             f"{high:g} nm"
         )
+    warn_of_other_directions(table, lights[1], lights[2])
     orders = orders_of(table, lights[0][0])
     count = np.prod([len(axis) for axis in lights], dtype=float) * len(orders)
     if count > _MOST_LINES:  # more than can be read again
