@@ -133,12 +133,12 @@ def list_orders(
     )
     m_x, m_y = orders[n].T
     index = (table.block or 1.0) if from_below else 1.0
+    steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
+    shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
+    square = crossed_square(*(index * part for part in mirror_of(polar, azimuth)), *shifts)
     # at the normal, φ decides what s is
     level = np.where(polar == 0.0, MIN_ANGLE, polar)
     x, y = (index * part for part in mirror_of(level, azimuth))
-    steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
-    shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
-    square = crossed_square(x, y, *shifts)
     # of a block, orders within it are more
     leaves = square + (table.block or 1.0) ** 2 - 1.0 > _EDGE
     parts = (lam, polar, azimuth, m_x, m_y, x, y)
