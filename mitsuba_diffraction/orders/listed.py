@@ -69,7 +69,7 @@ def listed_response(
 ) -> ListedResponse:
     """Return the lights on a grid without gaps."""
     crossed = bool(np.isfinite(periods[1]))
-    theta, phi = _canonical(lights.theta, lights.phi, crossed)
+    theta, phi = canonical(lights.theta, lights.phi, crossed)
     polar = np.unique(theta)
     azimuths = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
     first, last = lights.orders.min(axis=0), lights.orders.max(axis=0)
@@ -166,7 +166,7 @@ def listed_jones(table: OrderTable, *light: ArrayLike) -> Complex:
     return entries.reshape(*x.shape, 2, 2)
 
 
-def _canonical(theta: ArrayLike, phi: ArrayLike, crossed: bool) -> tuple[Real, Real]:
+def canonical(theta: ArrayLike, phi: ArrayLike, crossed: bool) -> tuple[Real, Real]:
     """Return θ (b,) from 0 and φ (c,), (b, c) each: φ to 180° on grooves, below 360° on crossed."""
     theta, azimuth = np.meshgrid(theta, phi, indexing="ij")
     turned = (azimuth + np.where(theta < 0.0, 180.0, 0.0)) % 360.0
@@ -222,7 +222,7 @@ def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
     """Warn of directions that a list lacks."""
     response = table.response
     assert isinstance(response, ListedResponse)
-    theta, phi = _canonical(lights.theta, lights.phi, table.crossed)
+    theta, phi = canonical(lights.theta, lights.phi, table.crossed)
     bearings = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
     if table.crossed:
         if np.diff(bearings, append=bearings[0] + 360.0).max() > WIDEST_GAP:
@@ -250,7 +250,7 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
     if not isinstance(response, ListedResponse):
         return
     _, polar, azimuths = response.axes
-    asked = np.stack(_canonical(theta, phi, table.crossed), axis=-1).reshape(-1, 2)
+    asked = np.stack(canonical(theta, phi, table.crossed), axis=-1).reshape(-1, 2)
     steep, turned = asked.T
     near = 10.0**-_DIGITS
     within = (turned >= azimuths[0] - near) & (turned <= azimuths[-1] + near)
@@ -264,7 +264,7 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
     listed = table.header.get("directions")
     if listed is None:
         listed = [[t, p] for t in polar for p in azimuths if 0.0 <= p < 360.0]
-    places = [np.concatenate(_canonical([t], [p], table.crossed), axis=-1)[0] for t, p in listed]
+    places = [np.concatenate(canonical([t], [p], table.crossed), axis=-1)[0] for t, p in listed]
     nearest = KDTree(_unit(np.array(places))).query(_unit(asked[~within]))[1]
     named = ["theta {:g}°, phi {:g}°".format(*listed[n]) for n in np.unique(nearest)]
     first = np.argmin(within)
