@@ -48,6 +48,8 @@ def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypat
     lines = (tmp_path / "grating-spectrum.csv").read_text().split()
     first, last = (float(lines[n].partition(",")[0]) for n in (1, -1))
     assert 420 <= first < last <= 680
+    part = run("spectrum", "grating.nc", "--wavelength-range", "300:900", "--step", 100)
+    assert "500 to 600 nm, which every table has" in part.err.replace("\n", " ")
     refused = run("spectrum", "grating.nc", "--wavelength-range", "300:400")
     assert "420 to 680 nm" in refused.err
 
