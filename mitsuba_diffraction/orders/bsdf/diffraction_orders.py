@@ -33,8 +33,7 @@ powers. RGB variants sum f over daylight. Polarised variants have the Mueller ma
 `solve --polarised`; with another table they depolarise the light, and warn once. Wavelengths
 outside the table by less than a tenth of an octave have the efficiencies of the nearest in it;
 other light is not reflected, which is warned of where it is visible. f is reciprocal as far as the
-table is, at the centres of lobes. A table of some directions answers by ωi or by ωo, whichever is
-nearer to one of them.
+table is, at the centres of lobes.
 
 A table of a thin sheet (`solve --thin`) makes the BSDF a sheet, with the grating on the side that
 normals point to. A table of a block (`solve --block`) makes it the block's face, with the table's
