@@ -60,6 +60,7 @@ def run(args: argparse.Namespace) -> Figures:
 
     set_variant(args.mode)
     from ..analysis.export import rgl, scatter, zemax
+    from ..analysis.export.nodes import lit_wavelengths
 
     module: Any = {"rgl": rgl, "zemax": zemax}.get(name, scatter)
     chosen = options.given(args, ("theta", "phi", "wavelengths"))
@@ -67,6 +68,10 @@ def run(args: argparse.Namespace) -> Figures:
     grid = module.DEFAULT._replace(**arrays, **options.given(args, ["resolution"]))
     with mitsuba_warnings(), Bar(args) as bar:
         bsdf = surface_bsdf(args)
+        if "wavelengths" not in arrays:  # those of a format that the table has
+            lit = lit_wavelengths(bsdf.describe(), grid.wavelengths)
+            if 0 < lit.sum() < lit.size:
+                grid = grid._replace(wavelengths=grid.wavelengths[lit])
         text = f"{args.source.name}: {bsdf.describe().text}"
         getattr(module, f"save_{name}")(bsdf, output, grid, text, bar)
     size = output.stat().st_size

@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> Figures:
     )
     if any(s.wavelength.size < lam.size for s in everything[first]):
         common = everything[first][0].wavelength
-        say(f"columns are from {common[0]:g} nm on, where every table begins")
+        say(f"columns are from {common[0]:g} to {common[-1]:g} nm, which every table has")
     spectra = {name: mean_spectra(parts) for name, parts in everything.items()}
     files_of_spectra.save_csv(spectra, output)
     if any(each.error is not None for each in spectra.values()):

@@ -135,7 +135,8 @@ def _linear(light: _Light) -> tuple[Real, Real, Real | None]:
 def mueller(table: OrderTable, *light: Any) -> Real:
     """Return the Mueller matrices of an order, (…, 4, 4), about the axes of `polarised`.
 
-    M₀₀ is `efficiency`. Arguments as for `efficiency`.
+    M₀₀ is `efficiency`, but for light far from all directions of a list. Arguments as for
+    `efficiency`.
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..arrays import Real
 from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
-from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
+from .listed import Lights, canonical, listed_response, listed_table, mirror_of, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
 from .polarised import MIN_ANGLE, turned_axes
 from .response import LARGEST_SUM, ListedResponse, orders_between
@@ -32,6 +32,8 @@ _ONE_WAY = 0.2
 #: Distance from grazing, in squared cosines, within which rounding decides whether an order
 #: propagates.
 _EDGE = 1e-6
+#: Largest difference of efficiencies that are listed twice: measurements repeat within it.
+_REPEATED = 1e-3
 #: Efficiency from which on relative errors are measured.
 _COUNTED = 1e-9
 
@@ -54,6 +56,7 @@ def imported_table(
     check_outline(periods, ends, superstrate, thin, listed=True)
     orders = grid.orders if crossed else np.column_stack([grid.orders, 0 * grid.orders])
     _check_orders(grid, orders, periods, superstrate, shown)
+    _check_repeated(grid, shown)
     values = np.where(np.isnan(grid.values), np.nan, np.maximum(grid.values, 0.0))
     lights = Lights(
         grid.wavelengths, grid.theta, grid.phi, orders, _elements(values, grid, crossed)
@@ -176,6 +179,22 @@ def _check_orders(
         )
 
 
+def _check_repeated(grid: Efficiencies, shown: str) -> None:
+    """Refuse a direction that is there in other words with other efficiencies."""
+    theta, phi = (part.ravel() for part in canonical(grid.theta, grid.phi, True))
+    names = np.stack(np.meshgrid(grid.theta, grid.phi, indexing="ij"), axis=-1).reshape(-1, 2)
+    values = np.nan_to_num(grid.values).reshape(len(grid.wavelengths), len(theta), -1)
+    first: dict[tuple[float, float], int] = {}
+    for n in np.flatnonzero(theta > 0.0).tolist():  # along the normal φ says what s is
+        before = first.setdefault((theta[n], phi[n]), n)
+        if np.abs(values[:, n] - values[:, before]).max() > _REPEATED:
+            (t, p), (same_t, same_p) = names[n], names[before]
+            raise DiffractionError(
+                f"{shown}: theta {t:g}°, phi {p:g}° is the direction of theta {same_t:g}°, phi "
+                f"{same_p:g}°, with other efficiencies; list it once"
+            )
+
+
 def _shown(order: NDArray[np.int64], crossed: bool) -> str:
     return f"({order[0]}, {order[1]})" if crossed else str(order[0])
 
@@ -210,8 +229,10 @@ def _errors(
              for part, period in zip(orders.T, table.periods, strict=True)]  # fmt: skip
     out = x + shift[0], y + shift[1]
     known = (np.hypot(*out) <= np.hypot(x, y).max()) & others
-    forth = table.efficiency(*light)
-    back = np.where(known, table.efficiency(-out[0], -out[1], *light[2:]), forth)
+    # `efficiency` may be that of reversed light already
+    forth = got[0].mean(axis=-1)
+    reversed_ = table.polarised_efficiency(-out[0], -out[1], *light[2:])
+    back = np.where(known, reversed_.mean(axis=-1), forth)
     sent = float(forth[np.broadcast_to(known, forth.shape)].sum())
     reciprocity = float(np.abs(back - forth).sum()) / max(sent, 1e-12)
     return {**error.facts(), "reciprocity_error": reciprocity}

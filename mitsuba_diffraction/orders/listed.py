@@ -11,13 +11,11 @@ from scipy.spatial import KDTree
 from ..arrays import Complex, Real
 from ..errors import warn
 from .polarised import nearest_jones
-from .response import ListedResponse, orders_between
+from .response import STEEPEST, WIDEST_GAP, ListedResponse, orders_between
 from .table import OrderTable
 
 #: Decimals of degrees that tell directions apart.
 _DIGITS = 9
-#: Widest gap between azimuths of a crossed grating, degrees, that needs no warning.
-_WIDEST_GAP = 90.0
 #: Differences of directions (twice `polarised.MIN_ANGLE`), and relative ones of wavelengths, within
 #: which light is the listed one.
 _SAME, _SAME_WAVELENGTH = 4e-6, 1e-6
@@ -71,7 +69,7 @@ def listed_response(
 ) -> ListedResponse:
     """Return the lights on a grid without gaps."""
     crossed = bool(np.isfinite(periods[1]))
-    theta, phi = _canonical(lights, crossed)
+    theta, phi = canonical(lights.theta, lights.phi, crossed)
     polar = np.unique(theta)
     azimuths = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
     first, last = lights.orders.min(axis=0), lights.orders.max(axis=0)
@@ -168,9 +166,9 @@ def listed_jones(table: OrderTable, *light: ArrayLike) -> Complex:
     return entries.reshape(*x.shape, 2, 2)
 
 
-def _canonical(lights: Lights, crossed: bool) -> tuple[Real, Real]:
-    """Return θ from 0 and φ (b, c), degrees: φ to 180 on grooves, below 360 on crossed gratings."""
-    theta, azimuth = np.meshgrid(lights.theta, lights.phi, indexing="ij")
+def canonical(theta: ArrayLike, phi: ArrayLike, crossed: bool) -> tuple[Real, Real]:
+    """Return θ (b,) from 0 and φ (c,), (b, c) each: φ to 180° on grooves, below 360° on crossed."""
+    theta, azimuth = np.meshgrid(theta, phi, indexing="ij")
     turned = (azimuth + np.where(theta < 0.0, 180.0, 0.0)) % 360.0
     phi = np.asarray(np.round(turned, _DIGITS) % 360.0, np.float64)
     if not crossed:  # mirror images are alike
@@ -224,17 +222,17 @@ def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
     """Warn of directions that a list lacks."""
     response = table.response
     assert isinstance(response, ListedResponse)
-    theta, phi = _canonical(lights, table.crossed)
+    theta, phi = canonical(lights.theta, lights.phi, table.crossed)
     bearings = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
     if table.crossed:
-        if np.diff(bearings, append=bearings[0] + 360.0).max() > _WIDEST_GAP:
+        if np.diff(bearings, append=bearings[0] + 360.0).max() > WIDEST_GAP:
             warn(
                 f"{shown} has no light from some azimuths, which get the efficiencies of the "
                 "nearest direction in it; list phi from 0 to 345 in steps of 15"
             )
         return
     sides = {0.0, 180.0} <= set(bearings.tolist())
-    if theta.max() < 75.0 or not sides:
+    if theta.max() < STEEPEST or not sides:
         warn(
             f"{shown} has no light from some directions, which get the efficiencies of the nearest "
             "direction in it; list theta from -85 to 85 in steps of 5 or 10 to have all of them"
@@ -244,3 +242,40 @@ def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
             f"{shown} has light across the grooves only (phi = 0): other light gets the same "
             "efficiencies, which is exact for perfect conductors alone"
         )
+
+
+def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
+    """Warn of light, from θ (b,) and φ (c,), degrees, beyond all directions of a list."""
+    response = table.response
+    if not isinstance(response, ListedResponse):
+        return
+    _, polar, azimuths = response.axes
+    asked = np.stack(canonical(theta, phi, table.crossed), axis=-1).reshape(-1, 2)
+    steep, turned = asked.T
+    near = 10.0**-_DIGITS
+    within = (turned >= azimuths[0] - near) & (turned <= azimuths[-1] + near)
+    if table.crossed and len(azimuths) == 3:  # one azimuth
+        within = turned == azimuths[1]
+    if response.in_plane:
+        within &= np.isin(turned, (0.0, 180.0))
+    within = (within | (steep == 0.0)) & (steep >= polar[0] - near) & (steep <= polar[-1] + near)
+    if within.all():
+        return
+    listed = table.header.get("directions")
+    if listed is None:
+        listed = [[t, p] for t in polar for p in azimuths if 0.0 <= p < 360.0]
+    places = [np.concatenate(canonical([t], [p], table.crossed), axis=-1)[0] for t, p in listed]
+    nearest = KDTree(_unit(np.array(places))).query(_unit(asked[~within]))[1]
+    named = ["theta {:g}°, phi {:g}°".format(*listed[n]) for n in np.unique(nearest)]
+    first = np.argmin(within)
+    t, p = (axis.ravel()[first] for axis in np.meshgrid(theta, phi, indexing="ij"))
+    warn(
+        f"theta {t:g}°, phi {p:g}° is outside the table's directions: such light gets the "
+        f"efficiencies of the nearest, {' or '.join(named[:3])}{' …' if named[3:] else ''}"
+    )
+
+
+def _unit(directions: Real) -> Real:
+    """Return unit vectors (n, 3) of θ and φ (n, 2), degrees."""
+    x, y = mirror_of(*directions.T)
+    return np.column_stack([x, y, np.cos(np.radians(directions[:, 0]))])

@@ -10,14 +10,16 @@ from ..arrays import Real
 from ..optics.arithmetic import Mask, Number, of
 from ..optics.orders import crossed_square, order_factor
 from .grid import OrderGrid
-from .lookup import Index, Lookup, Memory, Share, corner_weights
+from .lookup import RAISED, Index, Lookup, Memory, Share, corner_weights
 from .polarised import ODD, about_s, turned_axes
-from .response import ListedResponse
+from .response import LARGEST_SUM, ListedResponse
 from .table import OrderTable
 
 _DEGREE = 180.0 / np.pi
 #: Against division by 0 along the grooves.
 _LEAST_C = 1e-4
+#: Squared distance from a listed direction, square degrees, within which rounding places light.
+_LISTED = 1e-6
 
 
 class ListedRow(NamedTuple):
@@ -26,6 +28,9 @@ class ListedRow(NamedTuple):
     Attributes
     ----------
     second : 1 for light that comes from the second side, else 0.
+    away : squared distance of ωi from the nearest listed direction, square degrees.
+    total, scale : sum of all orders' light, and the factor that brings it to `LARGEST_SUM` at
+        most, of a list with gaps; else 0 and 1.
     """
 
     cell: Index
@@ -37,12 +42,17 @@ class ListedRow(NamedTuple):
     y: Number
     wavelength: Number
     face: Number
+    away: Number
+    total: Number
+    scale: Number
 
 
 class ListedLookup(Lookup):
     """Rows of a table of listed light, without a coat.
 
-    Orders are whole numbers, or pairs (m_x, m_y) on crossed gratings.
+    Orders are whole numbers, or pairs (m_x, m_y) on crossed gratings. Where directions are missing,
+    an order has the efficiency of ωi or of the reversed light from ωo, which is reciprocal to it:
+    the nearer to a listed direction counts. Elements of Mueller matrices are those of ωi.
 
     Attributes
     ----------
@@ -57,6 +67,7 @@ class ListedLookup(Lookup):
         self._material = response.index
         self._axes = [_Axis(nodes) for nodes in response.axes]
         self._in_plane, self._crossed = response.in_plane, table.crossed
+        self._gaps = response.index is None and response.lacks_directions(table.crossed)
         self.index = table.block or 1.0
         self._steps = [1e-3 / (period * table.superstrate) for period in table.periods]
         self._first = response.orders[0].tolist()
@@ -65,6 +76,19 @@ class ListedLookup(Lookup):
 
     def row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> Any:
         """See `lookup.Lookup.row`; x and y belong to wave vectors over 2π/λ."""
+        row = self._row(x, y, cos_i, wavelength)
+        if not self._gaps:
+            return row
+
+        def add(n: Index, inputs: tuple[Any, ...], total: Number) -> Number:
+            order, below = self.order_at(row := ListedRow(*inputs), n)
+            return total + self._either(row, order, True, below if self.sides == 2 else None)
+
+        total = self.memory.sum(self.ports(row), add, tuple(row), row.total)
+        scale = LARGEST_SUM / of(total).maximum(total, LARGEST_SUM)
+        return row._replace(total=total * scale, scale=scale)
+
+    def _row(self, x: Number, y: Number, cos_i: Number, wavelength: Number) -> ListedRow:
         xp = of(x, wavelength)
         second = xp.flag(cos_i < 0.0) if self.sides == 2 else xp.index(0.0 * x)
         light = self._angles(x, y, cos_i, wavelength)
@@ -72,7 +96,15 @@ class ListedLookup(Lookup):
         cell, weights = corner_weights(places, self._cells, self._scale)
         lit = (wavelength >= self._reach[0]) & (wavelength <= self._reach[1])
         start = (cell * self.sides + second) * (self.count * self.sides + 1)
-        return ListedRow(cell, start, second, weights, lit, x, y, wavelength, 0.0 * x)
+        zero = 0.0 * x
+        away = zero
+        if self._gaps:
+            aside = self._axes[2].distance(light[2]) * xp.sin(light[1] / _DEGREE)
+            distance = self._axes[1].distance(light[1])
+            away = distance * distance + aside * aside
+        return ListedRow(
+            cell, start, second, weights, lit, x, y, wavelength, zero, away, zero, 1.0 + zero
+        )
 
     def _angles(
         self, x: Number, y: Number, cos_i: Number, wavelength: Number
@@ -135,12 +167,41 @@ class ListedLookup(Lookup):
     def share(self, row: Any, order: Any, active: Mask = True, below: Mask | None = None) -> Share:
         """See `lookup.Lookup.share`."""
         xp = of(row.wavelength)
+        if self._gaps:
+            light = self._either(row, order, active, below) * row.scale
+            return Share(light, light)
         port, leaves = self.port(row, order, active, below)
         chance = xp.where(leaves, self.at_port(row, port, self._parts - 1, leaves), 0.0)
         if self._material is None:
             return Share(chance, chance)
         light = self.at_port(row, port, 0, leaves) * self._factor(row, *order)
         return Share(xp.where(leaves, light, 0.0), chance)
+
+    def total(self, row: Any, active: Mask = True) -> Number:
+        """See `lookup.Lookup.total`."""
+        return row.total * RAISED if self._gaps else super().total(row, active)
+
+    def _either(self, row: Any, order: Any, active: Mask, below: Mask | None) -> Number:
+        """Return an order's efficiency between that of ωi and that of the reversed light from ωo.
+
+        Each has the weight of the other's squared distance from a listed direction.
+        """
+        xp = of(row.wavelength)
+        port, leaves = self.port(row, order, active, below)
+        m_x, m_y = order if self._crossed else (order, 0.0 * row.wavelength)
+        x, y = (
+            m * row.wavelength * step - part
+            for m, step, part in zip((m_x, m_y), self._steps, (row.x, row.y), strict=True)
+        )
+        up = 1.0 + 0.0 * row.x
+        back = self._row(x, y, up if below is None else xp.where(below, -up, up), row.wavelength)
+        came = None if below is None else row.second > 0
+        backwards, _ = self.port(back, order, leaves, came)
+        forth, reverse = (
+            self.at_port(light, at, 0, leaves) for light, at in ((row, port), (back, backwards))
+        )
+        share = row.away / (row.away + back.away + _LISTED)
+        return xp.where(leaves, forth + (reverse - forth) * share, 0.0)
 
     def elements(
         self, row: Any, order: Any, y: Number, active: Mask = True,
@@ -195,3 +256,11 @@ class _Axis:
         for low, high in zip(self._nodes[:-1].tolist(), self._nodes[1:].tolist(), strict=True):
             place = place + xp.clip((value - low) * (1.0 / (high - low)), 0.0, 1.0)
         return place * (1.0 / count)
+
+    def distance(self, value: Number) -> Number:
+        """Return the distance from the nearest node."""
+        xp = of(value)
+        nearest = xp.absolute(value - float(self._nodes[0]))
+        for node in self._nodes[1:].tolist():
+            nearest = xp.minimum(nearest, xp.absolute(value - node))
+        return nearest

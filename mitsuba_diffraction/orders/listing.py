@@ -20,7 +20,7 @@ from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .efficiency import jones_matrices
 from .file import add_variable
-from .listed import mirror_of
+from .listed import mirror_of, warn_of_other_directions
 from .lists import CSV_AXES, PAIR, REFLECTED, TRANSMITTED, axes_of, check_light
 from .polarised import MIN_ANGLE
 from .response import ListedResponse, orders_between
@@ -99,7 +99,7 @@ def list_orders(
 
     Raises a DiffractionError if an angle or wavelength is out of its range, there are over two
     million lines, or the table has no s and p of conical light
-    (`OrderTable.polarised_efficiency`).
+    (`OrderTable.polarised_efficiency`). Warns of light outside the directions of a list.
 
     Parameters
     ----------
@@ -120,6 +120,7 @@ def list_orders(
             f"wavelengths from {lights[0][0]:g} to {lights[0][-1]:g} nm: the table has {low:g} to "
             f"{high:g} nm"
         )
+    warn_of_other_directions(table, lights[1], lights[2])
     orders = orders_of(table, lights[0][0])
     count = np.prod([len(axis) for axis in lights], dtype=float) * len(orders)
     if count > _MOST_LINES:  # more than can be read again
@@ -132,12 +133,12 @@ def list_orders(
     )
     m_x, m_y = orders[n].T
     index = (table.block or 1.0) if from_below else 1.0
+    steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
+    shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
+    square = crossed_square(*(index * part for part in mirror_of(polar, azimuth)), *shifts)
     # at the normal, φ decides what s is
     level = np.where(polar == 0.0, MIN_ANGLE, polar)
     x, y = (index * part for part in mirror_of(level, azimuth))
-    steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
-    shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
-    square = crossed_square(x, y, *shifts)
     # of a block, orders within it are more
     leaves = square + (table.block or 1.0) ** 2 - 1.0 > _EDGE
     parts = (lam, polar, azimuth, m_x, m_y, x, y)

@@ -7,7 +7,8 @@ A CSV has a header line and the columns
 one line for each propagating order of each light. A NetCDF file, classic or version 4 (HDF5), has
 the variables R_s, R_p [, T_s, T_p] over the dimensions wavelength, theta, phi and order, in any
 order, with a coordinate variable each; `units` of coordinates are nm (default), um or m, and
-degrees (default) or radians. The column or dimension of φ may be missing: φ = 0.
+degrees (default) or radians; of efficiencies 1 (default) or %. The column or dimension of φ may be
+missing: φ = 0.
 
 A crossed grating has the columns, or dimensions, order_x and order_y in place of order.
 
@@ -32,7 +33,7 @@ from scipy.io import netcdf_file
 
 from ..arrays import Real
 from ..columns import read_columns
-from ..errors import DiffractionError, one_line, quoted
+from ..errors import DiffractionError, one_line, quoted, warn
 from ..extras import optional
 from ..files import FileKind, beginning, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES, bounded_memory, check_content
@@ -55,6 +56,7 @@ _UNITS: dict[str, dict[str, float]] = {
     "wavelength": _LENGTHS, "theta": _ANGLES, "phi": _ANGLES,
     **{axis: {"1": 1.0} for axis in ("order", *PAIR)},
 }  # fmt: skip
+_PER_CENT = ("%", "percent", "per cent")
 _BEGINS_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -202,7 +204,8 @@ def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
                 f"expected {', '.join(every)} (phi may be missing)"
             )
         values = variable.values.transpose([variable.dimensions.index(d) for d in dimensions])
-        parts.append(values.reshape([len(axes[axis]) for axis in every]))
+        scale = 0.01 if variable.units.strip().lower() in _PER_CENT else 1.0
+        parts.append(scale * values.reshape([len(axes[axis]) for axis in every]))
     _check_size(parts[0].shape, len(parts), shown)
     values = np.stack(parts, axis=-1)
     for n, axis in enumerate(every):
@@ -218,6 +221,11 @@ def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
         pairs = np.meshgrid(*of_orders, indexing="ij")
         orders = np.stack(pairs, axis=-1).reshape(-1, 2).astype(np.int64)
         values = values.reshape(*values.shape[:3], len(orders), -1)
+    if unknown := [axis for axis in dimensions if axis in AXES[:3] and not variables[axis].units]:
+        warn(
+            f"{shown}: {', '.join(unknown)} without units: wavelengths are taken to be in nm, "
+            "angles in degrees"
+        )
     return Efficiencies(wavelengths, theta, phi, orders, values)
 
 

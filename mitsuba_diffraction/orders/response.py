@@ -20,6 +20,9 @@ LARGEST_SUM = 1.001
 ROUNDING = 2e-3
 #: Nodes along an axis at most: beyond, no renderer would want them.
 MOST_NODES = 64
+#: Largest θ up to which, and widest gap between azimuths of a crossed grating from which on,
+#: degrees, a list lacks directions.
+STEEPEST, WIDEST_GAP = 75.0, 90.0
 #: Numbers of elements of Mueller matrices that a response may have.
 UNPOLARISED, ALONG, LINEAR, MUELLER = 1, 2, 3, 16
 
@@ -159,6 +162,15 @@ class ListedResponse:
         """Size, for people."""
         waves, theta, phi = map(len, self.axes)
         return f"{waves} wavelengths x {theta} theta x {phi} phi, {len(self.orders)} orders"
+
+    def lacks_directions(self, crossed: bool) -> bool:
+        """Whether some light is far from all listed directions, of which there are several."""
+        _, theta, phi = self.axes
+        bearings = len(phi) - 2 if crossed else len(phi)
+        if len(theta) * bearings == 1:
+            return False
+        wide = np.diff(phi).max() > WIDEST_GAP if crossed else not {0.0, 180.0} <= set(phi)
+        return bool(theta[-1] < STEEPEST or wide)
 
     def check(self, sides: int, last_band: int) -> None:
         """Raise a DiffractionError if sizes do not fit a table, or numbers are no efficiencies.

@@ -48,6 +48,8 @@ def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypat
     lines = (tmp_path / "grating-spectrum.csv").read_text().split()
     first, last = (float(lines[n].partition(",")[0]) for n in (1, -1))
     assert 420 <= first < last <= 680
+    part = run("spectrum", "grating.nc", "--wavelength-range", "300:900", "--step", 100)
+    assert "500 to 600 nm, which every table has" in part.err.replace("\n", " ")
     refused = run("spectrum", "grating.nc", "--wavelength-range", "300:400")
     assert "420 to 680 nm" in refused.err
 
@@ -62,6 +64,9 @@ def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
     assert (tmp_path / "grating.csv").read_text().startswith("theta_i_deg,")
     assert (tmp_path / "grating.bsdf").read_text("ascii").endswith("DataEnd\n")
     assert json.loads((tmp_path / "grating.brdf").read_text())["metadata"]["type"] == "BRDF"
+    dark = run("export-bsdf", "grating.nc", *grid[:4], "--wavelength", "550,900", "-o", "dark.csv")
+    assert "380 to 780 nm" in dark.err
+    assert not (tmp_path / "dark.csv").exists()
     refused = run("export-bsdf", "grating.nc", "--format", "bird", "-o", "x.bsdf")
     assert ".json or .brdf" in refused.err
     assert "no heights" in run("evaluate", "grating.nc").err

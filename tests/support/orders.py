@@ -14,6 +14,7 @@ from scipy.special import jv
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
+from mitsuba_diffraction.orders.listed import Lights, listed_table
 from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, turn
 from mitsuba_diffraction.reference.model import small_slope
 from tests.support.directions import Array, as_single, uniform_directions
@@ -65,6 +66,22 @@ def thin_grating(
     )
     header = {"profile": "thin sinusoid"}
     return OrderTable((period, np.inf), wavelengths, CellResponse(bands), superstrate, header, thin)
+
+
+def listed_grating() -> OrderTable:
+    """`thin_grating` in light from -20, 0 and 20° alone."""
+    wavelengths, theta, orders = (
+        np.arange(380.0, 781.0, 50),
+        np.array([-20.0, 0.0, 20.0]),
+        range(-6, 7),
+    )
+    lam, sine, m = np.meshgrid(wavelengths, np.sin(np.radians(theta)), orders, indexing="ij")
+    values = thin_grating().efficiency(-sine, 0.0, lam, m)
+    values[np.abs(m * lam / (1e3 * PERIOD) - sine) >= 1.0] = np.nan
+    pairs = np.column_stack([orders, 0 * np.array(orders)])
+    values = values[:, :, None, None, None, :, None]
+    lights = Lights(wavelengths, theta, np.zeros(1), pairs, values)
+    return listed_table(lights, (PERIOD, np.inf), {"profile": "thin sinusoid"})
 
 
 def shallow_grating(

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.special import ndtri
 
@@ -204,7 +205,7 @@ def laid(
     mean of its distances to both neighbours.
 
     Raises a DiffractionError if the variant cannot be evaluated, the surface transmits or varies,
-    or its lobes are too narrow to be integrated.
+    its table has no light of a wavelength, or its lobes are too narrow to be integrated.
     """
     if not mi.is_spectral or mi.is_polarized or "scalar" in mi.variant():
         raise DiffractionError(
@@ -213,6 +214,12 @@ def laid(
         )
     require_loaded_llvm()
     surface = FILES.described(bsdf)
+    if not (lit := lit_wavelengths(surface, grid.wavelengths)).all():
+        low, high = surface.orders.wavelengths if surface.solved else surface.wavelengths
+        raise DiffractionError(
+            f"wavelength {grid.wavelengths[~lit][0]:g} nm: the table has {low:g} to {high:g} nm, "
+            "and reflects no such light; choose others"
+        )
     lobe = 1.0 / (math.sqrt(2.0) * surface.sigma * float(wavenumber(grid.wavelengths[0])))
     solved = surface.solved and surface.nested is None and lobe < 0.5 * nodes.size
     p, q, area, number = nodes.lattice(math.inf if solved else math.sqrt(2.0) * lobe)
@@ -244,6 +251,15 @@ def laid(
         for part, areas, out in zip(light, solid, wo, strict=True):
             yield _values(nodes, part, hats @ (areas if nodes.cosine else areas * out[:, 2]))
     progress(1, 1, "evaluating")
+
+
+def lit_wavelengths(surface: Surface, wavelengths: Real) -> NDArray[np.bool_]:
+    """Return which wavelengths (n,), nm, a surface's table has light of.
+
+    Tables of heights serve all light above their shortest wavelength.
+    """
+    low, high = surface.wavelengths
+    return (wavelengths >= low) & (wavelengths <= (high if surface.solved else math.inf))
 
 
 def _values(nodes: Nodes, light: Real, weight: Real) -> Laid:

@@ -75,6 +75,11 @@ class Located(NamedTuple):
     orders: NDArray[np.int64]
 
 
+#: Factor on wavelengths that tells cells: where two orders graze at once, on both sides, it makes
+#: both propagate.
+_SHORTER = 1.0 - 1e-10
+
+
 def located(grating: Grating, x: Real, y: Real, wavelength: Real) -> list[Located]:
     """Return the stations of some lights (n,), by their mirror directions and wavelengths, nm."""
     if grating.cell is not None:
@@ -88,7 +93,7 @@ def located(grating: Grating, x: Real, y: Real, wavelength: Real) -> list[Locate
             )
             for station, lam in zip(stations, wavelength.tolist(), strict=True)
         ]
-    cell = cells.to_cell(x, y, wavelength, grating.optical_period)
+    cell = cells.to_cell(x, y, wavelength * _SHORTER, grating.optical_period)
     w = cells.w_of(cell.k_continuous, wavelength, grating.wavelengths, grating.optical_period)
     columns = (part.tolist() for part in (*cell[:2], cell.channel, cell.channels, *cell[3:5], w))
     return [

@@ -371,6 +371,16 @@ def test_bird_s_json_has_f_of_each_pair(tmp_path):
         assert np.corrcoef(columns["BRDF"][row], expected)[0, 1] > 0.98
 
 
+@pytest.mark.parametrize(
+    ("surface", "wavelength"), [(FLAT, 300.0), (OrderTable.mirror(0.6), 900.0)]
+)
+def test_light_that_a_table_lacks_is_refused(tmp_path, surface, wavelength):
+    grid = zemax.DEFAULT._replace(wavelengths=np.array([wavelength]))
+    with pytest.raises(DiffractionError, match=rf"wavelength {wavelength:g} nm: .* to \d+ nm"):
+        zemax.save_zemax(mi.load_dict(md.bsdf_dict(surface)), tmp_path / "x.bsdf", grid)
+    assert not list(tmp_path.iterdir())
+
+
 def test_surfaces_that_transmit_and_too_large_files_are_refused(tmp_path):
     sheet = mi.load_dict(md.bsdf_dict(thin_grating(0.6, counts=(2, 2, 1), thin=True)))
     with pytest.raises(DiffractionError, match="light that goes through"):

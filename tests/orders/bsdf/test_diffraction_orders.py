@@ -15,6 +15,7 @@ from tests.support.directions import polar
 from tests.support.furnace import furnace_in
 from tests.support.orders import (
     PERIOD,
+    listed_grating,
     lit_pairs,
     load,
     on_all_sides,
@@ -23,10 +24,10 @@ from tests.support.orders import (
 )
 from tests.support.variants import evaluate
 
-TABLE, SHEET = thin_grating(), thin_grating(thin=True)
+TABLE, SHEET, LISTED = thin_grating(), thin_grating(thin=True), listed_grating()
 
 
-@pytest.mark.parametrize("table", [TABLE, SHEET], ids=["grating", "sheet"])
+@pytest.mark.parametrize("table", [TABLE, SHEET, LISTED], ids=["grating", "sheet", "listed"])
 def test_values_are_the_references_and_weights_the_albedo(some_variant, table):
     wi, wo, samples, wavelength = lit_pairs(80)
     wavelength[:] = wavelength[:, :1]
@@ -59,6 +60,24 @@ def test_values_are_the_references_and_weights_the_albedo(some_variant, table):
     assert weights[far, 0] == pytest.approx(albedo[far], rel=3e-3)
     passed = 0.72 if table.thin else 0.0
     assert (drawn[valid, 2] * wi[valid, 2] < 0.0).mean() == pytest.approx(passed, abs=0.15)
+
+
+def test_light_from_a_listed_direction_is_seen_from_all_directions(some_variant):
+    """A camera looks along ωi, and light comes along ωo: by reciprocity it has the list's light."""
+    orders, lam = np.array([-1, 1, 2, 3]), 580.0  # a listed wavelength
+    sine = np.sin(np.radians(20.0))
+    lamp = np.tile(polar(20.0, 0.0), (len(orders), 1))
+    across = orders * lam / (1e3 * PERIOD) - sine
+    seen = np.column_stack([across, 0.0 * across, np.sqrt(1.0 - across**2)])
+    light = np.zeros((len(orders), 3)), np.full((len(orders), 4), lam)
+    table = load(LISTED, wavelength=lam)
+    forth = evaluate(table, lamp, seen, *light)[0] / seen[:, 2:]
+    back = evaluate(table, seen, lamp, *light)[0] / lamp[:, 2:]
+    assert back == pytest.approx(forth, rel=5e-3 if mi.is_rgb else 1e-3)
+    # the list's light, but for half floats
+    truth = TABLE.efficiency(-sine, 0.0, lam, orders)
+    assert LISTED.efficiency(-sine, 0.0, lam, orders) == pytest.approx(truth, rel=2e-3)
+    assert LISTED.efficiency(-across, 0.0, lam, orders) == pytest.approx(truth, rel=2e-3)
 
 
 @pytest.mark.parametrize("component", [0, 1])

@@ -15,6 +15,7 @@ from tests.support.chi_square import DISPERSED, Case, chi_square
 from tests.support.directions import as_single, uniform_directions
 from tests.support.orders import (
     PERIOD,
+    listed_grating,
     lit_pairs,
     load,
     on_all_sides,
@@ -31,6 +32,7 @@ TABLES = {
     "bare": thin_grating(),
     "under a coat": thin_grating(superstrate=1.5),
     "sheet": thin_grating(thin=True),
+    "listed": listed_grating(),
 }
 
 
@@ -46,7 +48,7 @@ def test_values_under_a_coat_are_the_references(some_variant):
     assert np.abs(values[:, 0] - expected).sum() <= 0.01 * expected.sum()
 
 
-@pytest.mark.parametrize("name", ["bare", "sheet"])
+@pytest.mark.parametrize("name", ["bare", "sheet", "listed"])
 def test_every_variant_has_the_same_light(every_variant, name):
     table, n = TABLES[name], 4 if "scalar" in every_variant else 12
     wi, wo, samples, wavelength = lit_pairs(n)
@@ -103,7 +105,13 @@ def test_a_mirror_is_that_of_the_plugin_diffraction(some_variant):
 
 @pytest.mark.parametrize(
     ("name", "theta", "side"),
-    [("bare", 0.0, 1.0), ("bare", 60.0, 1.0), ("sheet", 30.0, 1.0), ("sheet", 30.0, -1.0)],
+    [
+        ("bare", 0.0, 1.0),
+        ("bare", 60.0, 1.0),
+        ("listed", 35.0, 1.0),
+        ("sheet", 30.0, 1.0),
+        ("sheet", 30.0, -1.0),
+    ],
 )
 def test_the_density_is_that_of_the_samples(some_variant, name, theta, side):
     # a window of three periods: lobes that overlap, and wide enough for the histogram

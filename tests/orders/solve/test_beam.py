@@ -9,6 +9,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
@@ -103,3 +104,15 @@ def test_the_integral_method_solves_an_order_that_leaves_at_grazing():
     missed = np.abs(table.efficiency(*light) - other.efficiency(*light)).sum()
     # the next resolution changes at most half the tolerance in either
     assert missed < GREEN.tolerance
+
+
+def test_both_sides_are_alike_where_orders_graze_on_both():
+    """K = 2d/λ is 4: orders 2 and -2 graze at once, and neither is solved without the other."""
+    settings = Settings(wavelengths=(500.0, 500.0), resolution=12)
+    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
+        table = solve_orders(sinusoidal(1.0, 0.1), 1.5, theta=0.0, settings=settings)
+    assert (table.response.orders[:, 0] == np.arange(-2, 3)).all()
+    left, right = table.efficiency(0.0, 0.0, 500.0, [-1, 1])
+    assert left == pytest.approx(right, rel=1e-6)  # single precision
+    listing = list_orders(table, 500.0, 0.0)
+    assert listing.rows[:, 3].tolist() == [-1, 0, 1]

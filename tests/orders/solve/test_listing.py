@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.io import netcdf_file
@@ -11,7 +13,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.orders.lists import read_efficiencies
 from mitsuba_diffraction.reference.model import small_slope
-from tests.support.orders import shallow_grating, thin_grating
+from tests.support.orders import listed_grating, shallow_grating, thin_grating
 
 INDEX = 1.2 + 6.0j
 
@@ -136,3 +138,18 @@ def test_efficiencies_in_netcdf_are_read_as_a_list(tmp_path):
     listing.save(tmp_path / "list.nc")
     grid = read_efficiencies(tmp_path / "list.nc")
     assert np.nansum(grid.values) == pytest.approx(listing.rows[:, 4:].sum())
+
+
+@pytest.mark.parametrize(
+    ("theta", "phi", "nearest"),
+    [
+        (45.0, 0.0, "theta 20°, phi 0°"), (-45.0, 0.0, "theta 20°, phi 180°"),
+        (20.0, 30.0, "theta 20°, phi 0°"), (-20.0, 360.0, None), (20.0, 180.0, None),
+        (10.0, 0.0, None),
+    ],
+)  # fmt: skip
+def test_light_outside_the_directions_of_a_list_is_warned_of(theta, phi, nearest):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        list_orders(listed_grating(), 580.0, theta, phi)
+    assert [nearest in str(each.message) for each in caught] == [True] * (nearest is not None)

@@ -18,6 +18,7 @@ from tests.support.orders import thin_grating
 
 HEADER = "wavelength_nm,theta_deg,phi_deg,order,R_s,R_p\n"
 PERIOD = 0.8
+UNITS = {"wavelength": "nm", "theta": "degrees", "phi": "degrees"}
 AXES = {
     "wavelength": np.arange(500.0, 641.0, 35),
     "theta": np.arange(0.0, 86, 5),
@@ -117,7 +118,7 @@ def content(power, dimensions=tuple(AXES)):
 @settings(max_examples=3, deadline=None)
 @given(
     dimensions=st.permutations(list(AXES)),
-    length=st.sampled_from([("", 1), ("um", 1e-3), ("m", 1e-9)]),
+    length=st.sampled_from([("nm", 1), ("um", 1e-3), ("m", 1e-9)]),
     angle=st.sampled_from([("degrees", 1), ("radian", np.pi / 180)]), backwards=st.booleans(),
 )  # fmt: skip
 def test_netcdf_has_what_csv_has(power, table, write, dimensions, length, angle, backwards):
@@ -136,12 +137,12 @@ def test_netcdf_has_what_csv_has(power, table, write, dimensions, length, angle,
 
 def test_other_conventions_are_noticed(power, tmp_path):
     path = tmp_path / "mine.nc"
-    write_classic(path, {**AXES, "order": -AXES["order"]}, content(power), {})
+    write_classic(path, {**AXES, "order": -AXES["order"]}, content(power), UNITS)
     with pytest.raises(DiffractionError, match="signs of the orders"):
         md.read_orders(path, PERIOD)
     # without the ratio of cosines that makes a power of a squared amplitude
     cosine = np.cos(np.radians(AXES["theta"]))[:, None, None]
-    write_classic(path, AXES, content(power * cosine), {})
+    write_classic(path, AXES, content(power * cosine), UNITS)
     with pytest.warns(DiffractionWarning, match="ratio of cosines"):
         md.read_orders(path, PERIOD)
 
@@ -249,6 +250,36 @@ def test_units_that_are_unknown_are_named(power, tmp_path):
     write_classic(path, AXES, content(power), {"wavelength": "THz"})
     with pytest.raises(DiffractionError, match="THz"):
         md.read_orders(path, PERIOD)
+
+
+def test_units_that_are_missing_are_named_and_per_cent_are_converted(power, table, tmp_path):
+    path = tmp_path / "mine.nc"
+    write_classic(path, AXES, content(power), {"theta": "degrees"})
+    with pytest.warns(DiffractionWarning, match="wavelength, phi without units"):
+        md.read_orders(path, PERIOD)
+    write_classic(path, AXES, content(power), UNITS)
+    with netcdf_file(path, "a") as file:
+        file.variables["R_s"].units = file.variables["R_p"].units = "%"
+    percent = md.read_orders(path, PERIOD)
+    np.testing.assert_allclose(percent.response.values, 0.01 * table.response.values, atol=1e-6)
+
+
+@pytest.mark.parametrize("angles", [([-30, 30], [0, 180]), ([30], [0, 360]), ([30], [-90, 270])])
+@pytest.mark.parametrize("more", [0.0, 0.1])
+def test_a_direction_in_other_words_has_the_same_efficiencies(tmp_path, angles, more):
+    lines = [
+        f"500,{theta},{phi},0,{power},{power}\n"
+        for theta in angles[0]
+        for phi in angles[1]
+        for power in [0.2 + more * (phi == angles[1][1])]
+    ]
+    (tmp_path / "bench.csv").write_text(HEADER + "".join(lines))
+    if not more:
+        table = imported(tmp_path / "bench.csv", 0.2)
+        assert table.efficiency(0.0, 0.0, 500.0, 0) == pytest.approx(0.2, rel=1e-3)  # half floats
+        return
+    with pytest.raises(DiffractionError, match="is the direction of theta"):
+        imported(tmp_path / "bench.csv", 0.2)
 
 
 SMALL = {"wavelength": np.array([500.0, 600.0]), "theta": np.array([0.0, 40, 80]),
