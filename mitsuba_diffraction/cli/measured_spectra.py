@@ -148,10 +148,10 @@ class Measurement:
 
     def _say_first(self, line: str) -> None:
         """Print the notes on the first scan that has any, and warnings; count the others."""
-        from ..heights.validity import UNRELIABLE
+        from ..heights.validity import stands_in_full
 
         self._noted += 1
-        if self._noted == 1 or UNRELIABLE in line:
+        if self._noted == 1 or stands_in_full(line):
             say(line)
 
 

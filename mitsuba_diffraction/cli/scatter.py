@@ -8,7 +8,7 @@ from typing import Any
 
 from ..columns import save_numbers
 from . import options
-from .console import Bar
+from .console import Bar, say_warning
 from .report import Figures, beside, output_of, save_figure
 
 #: He-Ne laser, nm.
@@ -43,8 +43,11 @@ def run(args: argparse.Namespace) -> Figures:
     field, settings = options.load_patch(args)
     spectrum = power_spectrum(field)
     ends = min(args.wavelengths) - 1.0, max(args.wavelengths) + 1.0
+    asked = TableSettings(**settings | {"wavelength_range": ends})
     with Bar(args) as bar:
-        table = build_with(field, TableSettings(**settings | {"wavelength_range": ends}), bar)
+        table = build_with(field, asked, bar)
+    if notes := options.notes(args, field, asked):
+        say_warning(notes)
     rows: list[dict[str, Any]] = []
     for wavelength in args.wavelengths:
         model = abg_model(spectrum, wavelength)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.columns import read_columns
+from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
 
@@ -35,3 +36,16 @@ def test_a_rough_mirror_s_spectrum_and_scatter_are_written(run, tmp_path, monkey
         # the table is scalar: without cosines, and with what roughness below λ scatters
         assert 1.0 < row["tis_table"] / row["tis_rayleigh_rice"] < 1.5
         assert row["g"] == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("slope", "said"), [(0.012, False), (0.1, True)])
+def test_the_tilt_of_a_mirror_is_levelled_or_said(run, tmp_path, monkeypatch, slope, said):
+    monkeypatch.chdir(tmp_path)
+    smooth = rough_patch((64, 64), (0.3, 0.3), 0.0005).heights
+    np.save("mirror.npy", smooth + slope * 0.3 * np.arange(64))
+    asked = ("scatter", "mirror.npy", "--pixel-size", "0.3", "--json", "figures.json")
+    ran = run(*asked)
+    assert ran.code == 0, ran.err
+    assert ("level=plane" in ran.err) is said, ran.err
+    row = json.loads((tmp_path / "figures.json").read_text())["wavelengths"][0]
+    assert (row["tis_table"] < 1e-3) is not said
