@@ -56,6 +56,16 @@ def in_medium(
     return TableSource.of([p.changed(index * p.heights, line).stretched(index) for p in patches])
 
 
+def optical_scale(parameters: Mapping[str, Any]) -> float:
+    """Return the factor on heights that a table has to serve: height_scale, times a coat's index.
+
+    parameters : of the BSDF. The coat's index is relative to the medium above it.
+    """
+    coat = index_at_sodium(parameters.get("coat_ior", 1.0), "coat_ior")
+    relative = 1.0 if isinstance(coat, str) else coat / medium_index(parameters.get("ext_ior"))
+    return float(parameters.get("height_scale", 1.0)) * max(relative, 1.0)
+
+
 def loaded_in_media(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return parameters of a BSDF with which `follow` can change its paths.
 

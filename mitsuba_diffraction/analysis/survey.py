@@ -36,7 +36,7 @@ from .crops import crops_of
 from .iridescence import WINDOW, MaterialFactor, light_and_chance
 from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
-from .media import in_medium
+from .media import in_medium, optical_scale
 from .repeats import sample_of, scan_files, write_repeats
 from .scans import bsdf_of, table_of
 from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
@@ -117,7 +117,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         dr.set_thread_count(job.threads)
     path, _ = job.files.here()
     source = TableSource.of(path, job.treatment.options).read()
-    settings = source.settings_for(job.treatment.settings)
+    settings = source.settings_for(job.treatment.settings, optical_scale(dict(job.surface)))
     if job.crop is not None:
         which, count = job.crop
         crops = crops_of(path, job.treatment.options, count, WINDOW)

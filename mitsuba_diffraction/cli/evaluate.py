@@ -188,6 +188,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
         method = make(args.method, within.field(), period=args.period, progress=bar, **settings)
         return method.brdf, method.sigma
     from ..analysis.known_wavelengths import check_material
+    from ..analysis.media import optical_scale
     from ..analysis.scans import bsdf_of, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..plugin.dictionary import bsdf_dict
@@ -198,8 +199,9 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     set_variant("llvm_ad_spectral")
     asked = {name: value for name, value in settings.items() if name != "step"}
     asked["wavelength_range"] = table_range(steps)
-    table = table_of(within, within.settings_for(asked), bar)
-    return partial(brdf_values, bsdf_of(bsdf_dict(table, **surface_parameters(args)))), table.sigma
+    parameters = surface_parameters(args)
+    table = table_of(within, within.settings_for(asked, optical_scale(parameters)), bar)
+    return partial(brdf_values, bsdf_of(bsdf_dict(table, **parameters))), table.sigma
 
 
 def _write(

@@ -59,6 +59,19 @@ def test_a_single_wavelength_is_measured_of_heights_too(run, scans):
     assert read("one.csv")["wl"].tolist() == 633.0
 
 
+@pytest.mark.parametrize("asked", [("--height-scale", "2"), ("--coat-ior", "1.6")])
+def test_the_table_serves_the_heights_that_are_asked_for(run, scans, asked):
+    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, *asked, "-o", "scaled.csv")
+    assert ran.code == 0, ran.err
+    twice = gratings.sinusoidal(period=1.6, depth=0.06, periods=5, rows=20).heights
+    np.save(scans / "twice.npy", twice)
+    ran = run("spectrum", scans / "twice.npy", *PIXEL, *QUICK, "-o", "twice.csv")
+    agrees = read("scaled.csv")["light30_detector30"] == pytest.approx(
+        read("twice.csv")["light30_detector30"], rel=0.01
+    )
+    assert agrees is (asked[0] == "--height-scale")
+
+
 def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
     ran = run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv")
     assert ran.code == 0, ran.err
