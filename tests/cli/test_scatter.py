@@ -38,6 +38,24 @@ def test_a_rough_mirror_s_spectrum_and_scatter_are_written(run, tmp_path, monkey
         assert row["g"] == pytest.approx(2.0, abs=0.3)
 
 
+def test_a_spectrum_that_no_model_fits_has_none_and_a_wrong_wavelength_is_named(
+    run, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    waves = 0.003 * np.sin(np.arange(192) * 2 * np.pi / 8)
+    np.save("waves.npy", np.tile(waves, (192, 1)))
+    asked = ("scatter", "waves.npy", "--pixel-size", "0.2", "--periodic", "exact")
+    ran = run(*asked, "--json", "figures.json")
+    assert ran.code == 0, ran.err
+    assert "no ABg model fits" in ran.out
+    row = json.loads((tmp_path / "figures.json").read_text())["wavelengths"][0]
+    assert row["a"] is row["error"] is None
+    for wrong in ("0.5", "200000"):
+        ran = run(*asked, "--wavelength", wrong)
+        assert ran.code == 2
+        assert "argument --wavelength: " in ran.err
+
+
 @pytest.mark.parametrize(("slope", "said"), [(0.012, False), (0.1, True)])
 def test_the_tilt_of_a_mirror_is_levelled_or_said(run, tmp_path, monkeypatch, slope, said):
     monkeypatch.chdir(tmp_path)

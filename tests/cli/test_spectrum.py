@@ -47,6 +47,7 @@ def test_a_csv_and_a_picture_are_written_and_named(run, scans, here):
     assert rows["wl"].tolist() == [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0]
     assert rows["light20_detector20"].min() > 100.0  # the mirror's light, in per cent of white
     document = json.loads((here / "s.json").read_text("utf-8"))
+    assert document["unit"] == "1"  # and the CSV in per cent
     assert document["spectra"]["light20_detector0"][0] == pytest.approx(
         rows["light20_detector0"][0] / 100.0, rel=1e-4
     )
