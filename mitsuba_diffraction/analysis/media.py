@@ -2,7 +2,8 @@
 
 Light's paths in a BSDF have one index, at sodium's line. A spectrum measured wavelength by
 wavelength has n(λ) instead: in a coat, by the parameter coat_eta; in a medium above the surface, in
-which waves are shorter, by the factors on all lengths.
+which waves are shorter, by the factors on all lengths. The index of a dielectric, eta, is relative
+to the medium above it.
 """
 
 from __future__ import annotations
@@ -91,8 +92,8 @@ def follow(
     """
     coat, medium = parameters.get("coat_ior"), parameters.get("ext_ior")
     changes: dict[str, Callable[[float], float]] = {}
-    if _disperses(coat):
-        changes["coat_eta"] = lambda lam: _dispersion(coat, lam)
+    if _disperses(coat) or (coat is not None and _disperses(medium)):
+        changes["coat_eta"] = lambda lam: _dispersion(coat, lam) / _dispersion(medium, lam)
     if _disperses(medium):
         most = _dispersion(medium, shortest)
         for name in ("height_scale", "lateral_scale"):
@@ -100,6 +101,9 @@ def follow(
     if not changes:
         return None
     shown = mi.traverse(bsdf)
+    above = medium if coat is None else coat
+    if "eta" in shown and _disperses(above):
+        changes["eta"] = lambda lam: 1.0 / _dispersion(above, lam)
     loaded = {name: float(dr.slice(shown[name])) for name in changes}
 
     def set_paths(wavelength: float) -> None:

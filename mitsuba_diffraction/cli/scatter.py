@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> Figures:
     axes.loglog(spectrum.frequency, spectrum.density, label="heights")
     if rows[0]["range"] is not None:
         lam = 1e-3 * rows[0]["wavelength"]
-        beta = np.geomspace(*rows[0]["range"], 64)
+        beta = np.geomspace(rows[0]["range"][0], rows[0]["range"][1], 64)
         fitted = rows[0]["a"] / (rows[0]["b"] + beta ** rows[0]["g"])
         axes.loglog(beta / lam, fitted * lam**4 / (16.0 * np.pi**2), "--", label="ABg model")
     axes.set(xlabel="spatial frequency, 1/µm", ylabel="power spectral density, µm⁴")
