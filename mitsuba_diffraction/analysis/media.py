@@ -2,7 +2,8 @@
 
 Light's paths in a BSDF have one index, at sodium's line. A spectrum measured wavelength by
 wavelength has n(λ) instead: in a coat, by the parameter coat_eta; in a medium above the surface, in
-which waves are shorter, by the factors on all lengths.
+which waves are shorter, by the factors on all lengths. The index of a dielectric, eta, is relative
+to the medium above it.
 """
 
 from __future__ import annotations
@@ -56,6 +57,16 @@ def in_medium(
     return TableSource.of([p.changed(index * p.heights, line).stretched(index) for p in patches])
 
 
+def optical_scale(parameters: Mapping[str, Any]) -> float:
+    """Return the factor on heights that a table has to serve: height_scale, times a coat's index.
+
+    parameters : of the BSDF. The coat's index is relative to the medium above it.
+    """
+    coat = index_at_sodium(parameters.get("coat_ior", 1.0), "coat_ior")
+    relative = 1.0 if isinstance(coat, str) else coat / medium_index(parameters.get("ext_ior"))
+    return float(parameters.get("height_scale", 1.0)) * max(relative, 1.0)
+
+
 def loaded_in_media(parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Return parameters of a BSDF with which `follow` can change its paths.
 
@@ -81,8 +92,8 @@ def follow(
     """
     coat, medium = parameters.get("coat_ior"), parameters.get("ext_ior")
     changes: dict[str, Callable[[float], float]] = {}
-    if _disperses(coat):
-        changes["coat_eta"] = lambda lam: _dispersion(coat, lam)
+    if _disperses(coat) or (coat is not None and _disperses(medium)):
+        changes["coat_eta"] = lambda lam: _dispersion(coat, lam) / _dispersion(medium, lam)
     if _disperses(medium):
         most = _dispersion(medium, shortest)
         for name in ("height_scale", "lateral_scale"):
@@ -90,6 +101,9 @@ def follow(
     if not changes:
         return None
     shown = mi.traverse(bsdf)
+    above = medium if coat is None else coat
+    if "eta" in shown and _disperses(above):
+        changes["eta"] = lambda lam: 1.0 / _dispersion(above, lam)
     loaded = {name: float(dr.slice(shown[name])) for name in changes}
 
     def set_paths(wavelength: float) -> None:

@@ -36,14 +36,14 @@ from .crops import crops_of
 from .iridescence import WINDOW, MaterialFactor, light_and_chance
 from .maps import brdf_map
 from .maps.result import BrdfMap, LightDirection
-from .media import in_medium
+from .media import in_medium, optical_scale
 from .repeats import sample_of, scan_files, write_repeats
 from .scans import bsdf_of, table_of
 from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 11
+VERSION = 12
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -116,8 +116,10 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
         dr.set_thread_count(job.threads)
     path, _ = job.files.here()
-    source = TableSource.of(path, job.treatment.options).read()
-    settings = source.settings_for(job.treatment.settings)
+    with warnings.catch_warnings(record=True) as overrides:
+        warnings.simplefilter("always", DiffractionWarning)
+        source = TableSource.of(path, job.treatment.options).read()
+    settings = source.settings_for(job.treatment.settings, optical_scale(dict(job.surface)))
     if job.crop is not None:
         which, count = job.crop
         crops = crops_of(path, job.treatment.options, count, WINDOW)
@@ -146,7 +148,8 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         row["windows"] = table.source["windows"]["number"]
         if "standard_error" in table.source["windows"]:
             row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
-    row["warnings"] = "; ".join(source.warnings(settings))
+    said = (str(warning.message) for warning in overrides)
+    row["warnings"] = "; ".join([*said, *source.warnings(settings)])
     phi = gratings[0].direction if gratings else 0.0
     # the energy of a metal is solved for some ten seconds; neither map nor index need it
     surface = {**dict(job.surface), "energy_conserving": False}
@@ -168,7 +171,9 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row["iridescent_light"] = (
         math.sqrt(index**2 - floor**2) * row["diffracted"] if (index > floor) else ""
     )
-    enough = widest_window(patches) >= 0.99 * WINDOW
+    # flat heights repeat exactly; as a scan they are as wide as they are
+    flat = all(patch.range == 0.0 for patch in patches)
+    enough = (min(width, height) if flat else widest_window(patches)) >= 0.99 * WINDOW
     row["ranked_among"] = f"scans {'from' if enough else 'below'} {WINDOW:g} µm"
     row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
     return {".exr": _exr(table), ".png": _png(measured)}

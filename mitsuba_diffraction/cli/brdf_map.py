@@ -49,7 +49,7 @@ MATERIAL = (
     ("--int-ior N", "index of the dielectric at all wavelengths, or its name; default: 1.5, as in "
      "scenes"),
     ("--ext-ior N", "refractive index of the surrounding medium, or its name: water for an animal "
-     "under water; default: air"),
+     "under water (at 589 nm; in spectrum at each wavelength); default: air"),
     ("--coat-ior N", "index of a flat clear coat over the surface, or its name: water on a wet "
      "animal"),
     ("--layers TOML", "stack of thin layers on the surface; parameter layers in "

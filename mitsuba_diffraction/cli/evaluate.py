@@ -6,6 +6,7 @@ import argparse
 import math
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,6 +22,7 @@ from .report import Figures, beside, elapsed, output_of, save_figure
 if TYPE_CHECKING:
     from ..heights.field import HeightField
     from ..heights.spectra import Periodicity
+    from ..tables.source import TableSource
     from ..thesis.period_fit import Beam, Fit, Response, Ridge
 
 # Single windows are fitted at about so many wavelengths: the period needs no more.
@@ -35,6 +37,7 @@ class _Experiment(NamedTuple):
     """Patch under a beam: gratings, periods in the plane of incidence (µm), and the axes."""
 
     patch: HeightField
+    within: TableSource  # the patch, lengths times the medium's index
     settings: dict[str, Any]  # of the method
     gratings: Sequence[Periodicity]
     held: list[float]
@@ -108,13 +111,15 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
         raise DiffractionError(
             f"method={args.method} reflects all light; leave the material out, or the method"
         )
+    from ..analysis.media import in_medium, medium_index
     from ..heights.spectra import dominant_periods
+    from ..tables.source import TableSource
     from ..thesis.methods.method import trapezoid_rule
     from ..thesis.methods.periods import check_period
     from ..thesis.period_fit import Beam
     from ..thesis.period_fit.ridge import check_axes
 
-    beam = Beam(args.theta, args.phi or 0.0)
+    beam = Beam(args.theta, args.phi or 0.0, medium_index(args.ext_ior))
     if args.period is not None:
         check_period(args.period)
     spectrum = options.wavelengths(args)
@@ -123,12 +128,14 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
     patch, settings = options.load_patch(args)
     gratings = dominant_periods(patch)
     if args.phi is None and gratings:
-        beam = Beam(args.theta, float(round(gratings[0].direction)))  # known to a degree
+        beam = replace(beam, phi=float(round(gratings[0].direction)))  # known to a degree
     held = periods_along(gratings, beam.phi)
-    reach = args.order * 1e-3 * steps[-1] / max(held) if held else None  # mλ/d of its last colour
+    # mλ/(n d) of its last colour
+    reach = args.order * float(beam.waves(steps[-1])) / max(held) if held else None
     angles = viewing_angles(args.angles, args.angle_step, args.theta, args.order, reach)
     check_axes(steps, angles)
-    return _Experiment(patch, {**settings, **spectrum}, gratings, held, beam, steps, angles)
+    within = in_medium(TableSource.of(patch), args.ext_ior)
+    return _Experiment(patch, within, {**settings, **spectrum}, gratings, held, beam, steps, angles)
 
 
 class _Result(NamedTuple):
@@ -154,7 +161,7 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
     from ..heights.coherence import resolved_width
     from ..thesis.period_fit import measure
 
-    patch, settings, _, held, beam, steps, angles = experiment
+    patch, _, settings, _, held, beam, steps, angles = experiment
     with Bar(args) as bar, mitsuba_warnings(), warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)  # `options.notes` has them
         brdf, sigma = _brdf(args, experiment, bar)
@@ -174,28 +181,27 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
 
 def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
     """Return the BRDF to measure and σ of its window: a method's, or of a surface of a material."""
-    patch, settings = experiment.patch, experiment.settings
+    within, settings = experiment.within, experiment.settings
     if args.method != "spectral" or settings.get("coherence") == "patch":
         from ..thesis.methods import make
 
-        method = make(args.method, patch, period=args.period, progress=bar, **settings)
+        method = make(args.method, within.field(), period=args.period, progress=bar, **settings)
         return method.brdf, method.sigma
     from ..analysis.known_wavelengths import check_material
-    from ..analysis.media import in_medium
+    from ..analysis.media import optical_scale
     from ..analysis.scans import bsdf_of, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..plugin.dictionary import bsdf_dict
     from ..scene.load import set_variant
-    from ..tables.source import TableSource
 
     steps = experiment.steps
     check_material(args.material, steps, args.pigment)
     set_variant("llvm_ad_spectral")
     asked = {name: value for name, value in settings.items() if name != "step"}
     asked["wavelength_range"] = table_range(steps)
-    source = in_medium(TableSource.of(patch), args.ext_ior)
-    table = table_of(source, source.settings_for(asked), bar)
-    return partial(brdf_values, bsdf_of(bsdf_dict(table, **surface_parameters(args)))), table.sigma
+    parameters = surface_parameters(args)
+    table = table_of(within, within.settings_for(asked, optical_scale(parameters)), bar)
+    return partial(brdf_values, bsdf_of(bsdf_dict(table, **parameters))), table.sigma
 
 
 def _write(
@@ -268,7 +274,7 @@ def viewing_angles(
 ) -> Any:
     """Viewing angles in degrees, (A,); by default from the mirror direction to the horizon's side.
 
-    reach : mλ/d of the order's last colour, signed; the range ends a quarter beyond it.
+    reach : mλ/(n d) of the order's last colour, signed; the range ends a quarter beyond it.
 
     Raises a DiffractionError if the range is empty or the step does not fit it.
     """
@@ -303,11 +309,11 @@ def _windows(
     from ..thesis.methods import make
     from ..thesis.period_fit import thesis_fit, window_fits
 
-    patch, settings, _, _, beam, steps, angles = experiment
+    _, within, settings, _, _, beam, steps, angles = experiment
     few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
     single = {**settings, "coherence": "patch"}
-    table = make("spectral", patch, progress=bar, **single).table  # type: ignore[attr-defined]
+    table = make("spectral", within.field(), progress=bar, **single).table  # type: ignore[attr-defined]
     lines: list[tuple[str, str]] = []
     more: dict[str, Any] = {}
     try:

@@ -97,7 +97,7 @@ class Measurement:
 
     def _of_heights(self, source: TableSource, file: Path, how: Any) -> Spectra:
         """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
-        from ..analysis.media import in_medium, medium_index
+        from ..analysis.media import in_medium, medium_index, optical_scale
         from ..analysis.scans import table_of
         from ..analysis.spectra import table_range
         from ..heights.coherence import blur
@@ -108,7 +108,7 @@ class Measurement:
         asked = {**self._treatment(file).settings, **options.table_options(args, options.TABLE)}
         asked["wavelength_range"] = table_range(self.lam)
         self.bar(0, 0, f"tabulating {file.name}")
-        settings = source.settings_for(asked)
+        settings = source.settings_for(asked, optical_scale(surface_parameters(args)))
         within = in_medium(source, args.ext_ior, first)
         table = table_of(within, settings, self.bar)
         line = notes_line(within.warnings(settings), file, how, TableSettings(**asked))
@@ -148,10 +148,10 @@ class Measurement:
 
     def _say_first(self, line: str) -> None:
         """Print the notes on the first scan that has any, and warnings; count the others."""
-        from ..heights.validity import UNRELIABLE
+        from ..heights.validity import stands_in_full
 
         self._noted += 1
-        if self._noted == 1 or UNRELIABLE in line:
+        if self._noted == 1 or stands_in_full(line):
             say(line)
 
 

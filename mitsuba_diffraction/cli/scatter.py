@@ -8,7 +8,7 @@ from typing import Any
 
 from ..columns import save_numbers
 from . import options
-from .console import Bar
+from .console import Bar, say_warning
 from .report import Figures, beside, output_of, save_figure
 
 #: He-Ne laser, nm.
@@ -31,20 +31,31 @@ _WAVELENGTH = 632.8
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the spectrum, and return the figures."""
+    ends = min(args.wavelengths) - 1.0, max(args.wavelengths) + 1.0
+    if not 10.0 <= ends[0] < ends[1] <= 1e5:
+        args.parser.error("argument --wavelength: expected wavelengths from 11 to 99999 nm")
     output = output_of(args, Path(f"{args.source.stem}-scatter.csv"), beside(".png"))
     import numpy as np
     from matplotlib.figure import Figure
 
-    from ..heights.scatter import abg_model, power_spectrum, rayleigh_rice_scatter
+    from ..heights.scatter import (
+        WORST_FIT,
+        ABg,
+        abg_model,
+        power_spectrum,
+        rayleigh_rice_scatter,
+    )
     from ..settings import TableSettings
     from ..tables.build.build import build_with
     from ..tables.powers import order_0_power
 
     field, settings = options.load_patch(args)
     spectrum = power_spectrum(field)
-    ends = min(args.wavelengths) - 1.0, max(args.wavelengths) + 1.0
+    asked = TableSettings(**settings | {"wavelength_range": ends})
     with Bar(args) as bar:
-        table = build_with(field, TableSettings(**settings | {"wavelength_range": ends}), bar)
+        table = build_with(field, asked, bar)
+    if notes := options.notes(args, field, asked):
+        say_warning(notes)
     rows: list[dict[str, Any]] = []
     for wavelength in args.wavelengths:
         model = abg_model(spectrum, wavelength)
@@ -53,17 +64,18 @@ def run(args: argparse.Namespace) -> Figures:
             "wavelength": wavelength,
             "tis_rayleigh_rice": rayleigh_rice_scatter(field, wavelength),
             "tis_table": 1.0 - float(order_0_power(table, kappa)),
-            **model._asdict(),
+            **(dict.fromkeys(ABg._fields) if model is None else model._asdict()),
         })  # fmt: skip
     numbers = np.column_stack([spectrum.frequency, spectrum.density])
     save_numbers(output, ("frequency_per_um", "psd_um4"), numbers)
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
     axes.loglog(spectrum.frequency, spectrum.density, label="heights")
-    lam = 1e-3 * rows[0]["wavelength"]
-    beta = np.geomspace(rows[0]["range"][0], rows[0]["range"][1], 64)
-    fitted = rows[0]["a"] / (rows[0]["b"] + beta ** rows[0]["g"])
-    axes.loglog(beta / lam, fitted * lam**4 / (16.0 * np.pi**2), "--", label="ABg model")
+    if rows[0]["range"] is not None:
+        lam = 1e-3 * rows[0]["wavelength"]
+        beta = np.geomspace(rows[0]["range"][0], rows[0]["range"][1], 64)
+        fitted = rows[0]["a"] / (rows[0]["b"] + beta ** rows[0]["g"])
+        axes.loglog(beta / lam, fitted * lam**4 / (16.0 * np.pi**2), "--", label="ABg model")
     axes.set(xlabel="spatial frequency, 1/µm", ylabel="power spectral density, µm⁴")
     axes.legend()
     save_figure(output.with_suffix(".png"), figure)
@@ -74,11 +86,15 @@ def run(args: argparse.Namespace) -> Figures:
         f"wavelengths {short:.3g} to {long:.3g} µm"
     )
     for row in rows:
+        fit = f"no ABg model fits within {WORST_FIT:.0%}"
+        if row["range"] is not None:
+            fit = (
+                f"A {row['a']:.3g} 1/sr, B {row['b']:.3g}, g {row['g']:.3g} for |β − β₀| "
+                f"{row['range'][0]:.2g} to {row['range'][1]:.2g}, within {row['error']:.0%}"
+            )
         print(
             f"  {row['wavelength']:g} nm  TIS {row['tis_rayleigh_rice']:.3g} by Rayleigh-Rice, "
-            f"{row['tis_table']:.3g} of the table; A {row['a']:.3g} 1/sr, B {row['b']:.3g}, g "
-            f"{row['g']:.3g} for |β − β₀| {row['range'][0]:.2g} to {row['range'][1]:.2g}, within "
-            f"{row['error']:.0%}"
+            f"{row['tis_table']:.3g} of the table; {fit}"
         )
     return {"rms_um": spectrum.rms, "slope": spectrum.slope, "band_um": list(spectrum.band),
             "wavelengths": rows}  # fmt: skip

@@ -165,7 +165,8 @@ def run(args: argparse.Namespace) -> Figures:
             "light_azimuth": turned or shown.geometry.azimuth,
             "detectors": shown.geometry.detectors,
             "acceptance": args.acceptance, "relative": args.relative,
-            "wavelengths": lam.tolist(), "spectra": columns}  # fmt: skip
+            # the CSV has per cent
+            "wavelengths": lam.tolist(), "unit": "1", "spectra": columns}  # fmt: skip
 
 
 def _measured(

@@ -24,6 +24,8 @@ _RINGS = 6
 _MOST_SCATTER = 0.1
 #: Fewest rings that an ABg model is fitted to.
 _FEWEST = 5
+#: RMS relative difference from the spectrum above which a model describes nothing.
+WORST_FIT = 1.0
 
 
 class PowerSpectrum(NamedTuple):
@@ -109,8 +111,10 @@ def rayleigh_rice_scatter(field: HeightField, wavelength: float) -> float:
     return float((16.0 * np.pi**2 / lam**2 * cosine * density).sum() / (nx * dx * ny * dy))
 
 
-def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg:
+def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg | None:
     """Fit the ABg model to a spectrum at a wavelength, nm, in logarithms over its modes.
+
+    Return None if its error exceeds `WORST_FIT`, as of gratings and of bands of roughness.
 
     Raises a DiffractionError if the heights are flat, or fewer than five rings of the spectrum
     scatter the light.
@@ -139,5 +143,7 @@ def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg:
     limits = ([-80.0, -60.0, 0.0], [80.0, 5.0, 8.0])
     fit = least_squares(residuals, np.clip(start, *limits), bounds=limits)
     error = float(np.sqrt(np.sum((weight * np.expm1(fit.fun / weight)) ** 2)))
+    if error > WORST_FIT:
+        return None
     a, b, g = float(np.exp(fit.x[0])), float(np.exp(fit.x[1])), float(fit.x[2])
     return ABg(a, b, g, (float(beta[0]), float(beta[-1])), error)

@@ -23,7 +23,7 @@ from .field import HeightField
 from .lengths import Crop, Height, PixelSize
 from .read import LoadOptions, read_heights, treat
 from .recipes import SOURCE_ONLY, Recipe
-from .validity import UNRELIABLE
+from .validity import stands_in_full
 
 #: Name of a file.
 Name = str | os.PathLike[str]
@@ -243,7 +243,7 @@ def notes_line(
 ) -> str:
     """Return the number of notes on a file, and the command that prints them, in one line.
 
-    A warning that the colours are not reliable stands there in full.
+    Warnings that `validity.stands_in_full` names stand there in full.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def notes_line(
         text = ",".join(n if isinstance(n, str) else f"{n:.9g}" for n in numbers)
         words += [f"--{name.replace('_', '-')}", text]
     number = "1 note" if len(lines) == 1 else f"{len(lines)} notes"
-    grave = "".join(f"{line}; " for line in lines if UNRELIABLE in line)
+    grave = "".join(f"{line}; " for line in lines if stands_in_full(line))
     return f"{grave}{number} on '{Path(path).name}': {shlex.join(words)}"
 
 

@@ -27,8 +27,8 @@ SMALLEST_RANGE = 1e-5
 
 #: RMS slope of 84°, steeper than any surface that is a height field: nanometres taken for µm.
 IMPOSSIBLE_SLOPE = 10.0
-#: Words of the warning that no command shortens.
-UNRELIABLE = "do not rely on its colours"
+#: Words of the warnings that no command shortens.
+UNRELIABLE, AS_FACET = "do not rely on its colours", "taken for a facet"
 #: Pixel size in µm beyond which the patch resolves at most a tenth of the directions at 380 nm.
 #: Scans have pixels of some nm to a few hundred.
 COARSEST_PIXEL = 2.0
@@ -45,8 +45,9 @@ SURE = 4.0
 #: that of a facet or of a groove: one period of a blazed or lamellar grating rises by 1.5 steps.
 STEP = 0.6
 #: Levelling a ramp stored in 8-bit grey leaves 0.4 % of its RMS height. A patch of which less than
-#: this is left is one facet, a whole period of a blazed grating: its seams are the grating's steps.
-FACET = 0.01
+#: this is left is a smooth scan that is tilted, or one facet, a whole period of a blazed grating:
+#: its seams are the grating's steps. Facets are steeper than a sample is mounted: 2.9°.
+FACET, FACET_SLOPE = 0.01, 0.05
 #: Ratio of the steps between medians of neighbouring rows to those of columns, from which on scan
 #: lines jump. Isotropic surfaces stay within 1.5; ridges along x have correlated rows.
 JUMPS = 3.0
@@ -123,8 +124,25 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
                 f"{plane_rise(field):.3g} µm across it and turns the mirror direction by "
                 f"{turn:.2g}°"
             )
+        elif _facet(field, level_plane(field)) and plane_rise(field) > shortest / QUARTER_WAVE:
+            lines.append(
+                f"{field.name}: use level=plane if it is a tilted scan: a plane that rises "
+                f"{plane_rise(field):.3g} µm is nearly all of its relief, {AS_FACET} of a blazed "
+                "grating and not levelled; periodic=exact says that it is one"
+            )
         lines += damage(field)
     return lines
+
+
+def stands_in_full(line: str) -> bool:
+    """Return whether commands print a warning itself, beside the number of the others."""
+    return UNRELIABLE in line or AS_FACET in line
+
+
+def _facet(field: HeightField, level: HeightField) -> bool:
+    """Return whether a patch is one facet, by its levelled heights."""
+    steep = math.hypot(*plane_of(field)) >= FACET_SLOPE
+    return steep and level.rms_height < FACET * field.rms_height
 
 
 def tilted(field: HeightField, shortest: float) -> bool:
@@ -134,9 +152,10 @@ def tilted(field: HeightField, shortest: float) -> bool:
 
     shortest : shortest wavelength, µm.
     """
-    level = level_plane(field).rms_height
-    if level < FACET * field.rms_height:
+    levelled = level_plane(field)
+    if _facet(field, levelled):
         return False
+    level = levelled.rms_height
     chance = max(CHANCE, SURE * math.sqrt(12.0 / field.heights.size))
     least = max(shortest / QUARTER_WAVE, chance * level)
     for axis, slope, length in zip((1, 0), plane_of(field), field.extent, strict=True):

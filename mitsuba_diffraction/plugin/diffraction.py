@@ -38,7 +38,7 @@ orientation : float or texture ∂ [0]
     bits: (1 + cos)/2, (1 + sin)/2.
 lateral_scale : float or texture ∂ [1]
     Factor on lengths in the plane, 0.01 to 100: multiplies the period. Number, raw texture or mesh
-    attribute of one channel.
+    attribute of one channel. Changeable only if given.
 lateral_scale_max : float [of a bitmap; max(1, the value loaded)]
     Largest lateral_scale that can be set later, or of a texture that is no bitmap. Tables grow with
     its square.
@@ -135,13 +135,14 @@ elsewhere the window shrinks with the patch. A table file serves lateral factors
 **Speckle.** `surface` requires texture coordinates of one scale, uv_scale or world_scale, and a
 spectral or mono variant. `random` tiling: Heitz and Neyret (2018).
 
-**Media.** ext_ior changes only the reflectance. For the shorter waves in a medium, multiply
-lateral_scale and height_scale by its index, as `--ext-ior` does.
+**Media.** ext_ior changes only the reflectance. For its shorter waves, multiply lateral_scale
+and height_scale by its index, as `--ext-ior` does. Renderings use water's index at 589 nm,
+`spectrum` n(λ).
 
 **Coats.** Light is refracted into the coat and out again; its face is a mirror of the same
 coherence width. Reflections between face and structure are summed. Light beyond the critical angle
-is lost (docs/validation.md). Renderings use water's index at 589 nm for paths: orders at 400 nm are
-up to 4 % too dark. `spectrum` uses n(λ).
+is lost (docs/validation.md). Under water's index at 589 nm, orders at 400 nm are up to 4 % too
+dark.
 
 **Films and stacks.** Scales of energy under a texture of thicknesses from 100 to 600 nm take a
 minute, once; beyond 82° single thicknesses send on up to 1.09 of the light. RGB variants sum the

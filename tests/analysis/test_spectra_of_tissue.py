@@ -70,6 +70,9 @@ def measured(parameters, lam, angles):
     [
         {"material": "keratin", "ext_ior": "water"},
         {"material": "keratin", "coat_ior": "water"},
+        {"material": "1.5", "ext_ior": "water"},
+        {"material": "1.5", "coat_ior": "water"},
+        {"material": "1.5", "coat_ior": "water", "ext_ior": "water"},
         {"material": "1.56+0.05i"},
         {"material": "1.56+0.05i", "ext_ior": "water"},
         {"material": "melanin", "coat_ior": "water"},
@@ -80,7 +83,7 @@ def measured(parameters, lam, angles):
 def test_orders_through_water_and_of_absorbing_tissue_are_the_reference_s(parameters, lam):
     water = float(index("water", lam).real)
     above = water if "ext_ior" in parameters else 1.0
-    coat = water if "coat_ior" in parameters else None
+    coat = water / above if "coat_ior" in parameters else None
     angles = [order_angle(LIGHT, m, lam, above) for m in ORDERS]
     angles = [a for a in angles if not math.isnan(a)]
     standard = np.cos(np.radians(angles)) * math.sin(math.radians(ACCEPTANCE / 2)) ** 2

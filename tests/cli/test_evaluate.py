@@ -62,6 +62,18 @@ def test_a_surface_of_a_material_is_the_reference_s(run, heights):
     assert found[::20] == pytest.approx(expected, rel=1e-2, abs=1e-3 * expected.max())
 
 
+@pytest.mark.parametrize("medium", ["1.05", "water"])
+def test_in_a_medium_the_period_is_the_surface_s_own(run, heights, medium):
+    # periods are longer in units of the waves, and the window is not
+    ran = run("evaluate", heights, *EXACT, *QUICK, "--coherence-width", "24", "--ext-ior", medium)
+    assert ran.code == 0, ran.err
+    with np.load("grating-evaluation.npz") as saved:
+        # as in air: a window of 4 periods moves the maxima, of single positions more
+        assert float(saved["fitted_period"]) == pytest.approx(3.0, rel=0.02)
+        assert saved["window_periods"] == pytest.approx(3.0, rel=0.05)
+        assert np.nanmax(np.abs(saved["grating"] - saved["ridge"])) < 1.0
+
+
 @pytest.mark.parametrize("method", METHODS[1:])
 def test_every_method_can_be_evaluated(run, heights, method):
     ran = run("evaluate", heights, *EXACT, *QUICK[:-1], "0", "--method", method, "-o", "a.png")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.columns import read_columns
+from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
 
@@ -35,3 +36,34 @@ def test_a_rough_mirror_s_spectrum_and_scatter_are_written(run, tmp_path, monkey
         # the table is scalar: without cosines, and with what roughness below λ scatters
         assert 1.0 < row["tis_table"] / row["tis_rayleigh_rice"] < 1.5
         assert row["g"] == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_spectrum_that_no_model_fits_has_none_and_a_wrong_wavelength_is_named(
+    run, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    waves = 0.003 * np.sin(np.arange(192) * 2 * np.pi / 8)
+    np.save("waves.npy", np.tile(waves, (192, 1)))
+    asked = ("scatter", "waves.npy", "--pixel-size", "0.2", "--periodic", "exact")
+    ran = run(*asked, "--json", "figures.json")
+    assert ran.code == 0, ran.err
+    assert "no ABg model fits" in ran.out
+    row = json.loads((tmp_path / "figures.json").read_text())["wavelengths"][0]
+    assert row["a"] is row["error"] is None
+    for wrong in ("0.5", "200000"):
+        ran = run(*asked, "--wavelength", wrong)
+        assert ran.code == 2
+        assert "argument --wavelength: " in ran.err
+
+
+@pytest.mark.parametrize(("slope", "said"), [(0.012, False), (0.1, True)])
+def test_the_tilt_of_a_mirror_is_levelled_or_said(run, tmp_path, monkeypatch, slope, said):
+    monkeypatch.chdir(tmp_path)
+    smooth = rough_patch((64, 64), (0.3, 0.3), 0.0005).heights
+    np.save("mirror.npy", smooth + slope * 0.3 * np.arange(64))
+    asked = ("scatter", "mirror.npy", "--pixel-size", "0.3", "--json", "figures.json")
+    ran = run(*asked)
+    assert ran.code == 0, ran.err
+    assert ("level=plane" in ran.err) is said, ran.err
+    row = json.loads((tmp_path / "figures.json").read_text())["wavelengths"][0]
+    assert (row["tis_table"] < 1e-3) is not said

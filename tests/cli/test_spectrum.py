@@ -41,6 +41,7 @@ def test_a_csv_and_a_picture_are_written_and_named(run, scans, here):
     assert rows["wl"].tolist() == [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0]
     assert rows["light20_detector20"].min() > 100.0  # the mirror's light, in per cent of white
     document = json.loads((here / "s.json").read_text("utf-8"))
+    assert document["unit"] == "1"  # and the CSV in per cent
     assert document["spectra"]["light20_detector0"][0] == pytest.approx(
         rows["light20_detector0"][0] / 100.0, rel=1e-4
     )
@@ -51,6 +52,19 @@ def test_a_single_wavelength_is_measured_of_heights_too(run, scans):
               "-o", "one.csv")  # fmt: skip
     assert ran.code == 0, ran.err
     assert read("one.csv")["wl"].tolist() == 633.0
+
+
+@pytest.mark.parametrize("asked", [("--height-scale", "2"), ("--coat-ior", "1.6")])
+def test_the_table_serves_the_heights_that_are_asked_for(run, scans, asked):
+    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, *asked, "-o", "scaled.csv")
+    assert ran.code == 0, ran.err
+    twice = gratings.sinusoidal(period=1.6, depth=0.06, periods=5, rows=20).heights
+    np.save(scans / "twice.npy", twice)
+    ran = run("spectrum", scans / "twice.npy", *PIXEL, *QUICK, "-o", "twice.csv")
+    agrees = read("scaled.csv")["light30_detector30"] == pytest.approx(
+        read("twice.csv")["light30_detector30"], rel=0.01
+    )
+    assert agrees is (asked[0] == "--height-scale")
 
 
 def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):

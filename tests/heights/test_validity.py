@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.validity import jumping_lines, tilted
+from mitsuba_diffraction.heights.validity import jumping_lines, stands_in_full, tilted
 from tests.support.directions import rough_patch
 
 SHORTEST = 0.36
@@ -35,6 +35,17 @@ def test_a_tilt_below_a_quarter_wave_is_left_alone():
     for share, said in ((0.9, False), (1.3, True)):
         tilt = share * SHORTEST / 8 * np.arange(64) / 63
         assert tilted(cut_out(0.1 * smooth + tilt), SHORTEST) is said, share
+
+
+@pytest.mark.parametrize("slope", [0.004, 0.012, 0.04, 0.1])
+def test_a_smooth_tilted_scan_is_levelled_or_said_to_be_taken_for_a_facet(slope):
+    smooth = rough_patch((64, 64), (0.3, 0.3), 0.0005).heights
+    scan = cut_out(smooth + slope * 0.3 * np.arange(64), 0.3)
+    # as steep as a blazed grating's facet, which a plane alone describes, too
+    steep = slope > 0.05
+    assert tilted(scan, SHORTEST) is not steep
+    assert any("level=plane" in line and stands_in_full(line) for line in scan.validity()) is steep
+    assert not any("level=plane" in line for line in scan.treated(level="plane").validity())
 
 
 @pytest.mark.parametrize("periods", [1, 2, 3, 7])

@@ -68,7 +68,8 @@ def commands_page() -> str:
         pages.table(("option", "meaning"), rows),
         "## Ranges, files and exit codes",
         "A range is `FIRST:LAST` or `FIRST:LAST:STEP`; commas separate values. Write `=` before a "
-        "negative value: `--angles=-60:75`. `--json FILE` writes the printed figures. Exit codes: "
+        "negative value: `--angles=-60:75`. `--json FILE` writes the printed figures; spectra "
+        'there are fractions, `"unit": "1"`, and per cent in the CSV. Exit codes: '
         "0 done, 1 failed, 2 wrong usage, 130 interrupted. No command replaces a file that it "
         "reads, and none leaves a half-written file.",
     ]

@@ -47,9 +47,13 @@ _LINES = 4000
 
 @dataclass(frozen=True)
 class Beam(LightDirection):
-    """Direction of the light, which defines the plane of incidence."""
+    """Direction of the light, which defines the plane of incidence, and the medium of its waves.
+
+    index : n of the medium above the patch. Wavelengths are in vacuum; waves have λ/n.
+    """
 
     theta: float = 75.0
+    index: float = 1.0
 
     @property
     def sine(self) -> float:
@@ -60,8 +64,12 @@ class Beam(LightDirection):
         """Return ωo (n, 3) of viewing angles in degrees, positive away from the light."""
         return polar(-np.radians(angles), math.radians(self.phi))
 
+    def waves(self, wavelength: Real) -> Real:
+        """Return the wavelengths in the medium, µm, of wavelengths in vacuum, nm."""
+        return wavelength * 1e-3 / self.index
+
     def grating_angles(self, wavelength: Real, period: float, order: int) -> Real:
-        """Return the viewing angles with sinθo = sinθi − mλ/d, degrees, or NaN without an order.
+        """Return the viewing angles with sinθo = sinθi − mλ/(n d), degrees; NaN without an order.
 
         Parameters
         ----------
@@ -69,7 +77,7 @@ class Beam(LightDirection):
         period : d, µm.
         order : m.
         """
-        sine = self.sine - order * wavelength * 1e-3 / period
+        sine = self.sine - order * self.waves(wavelength) / period
         return np.degrees(np.arcsin(np.where(np.abs(sine) <= 1.0, sine, np.nan)))
 
 
@@ -82,7 +90,8 @@ class Response:
     angles: Real  # (A,), degrees, ascending
     # (L, A), f·cosθo in 1/sr: share of the beam's power per solid angle at a small detector
     values: Real
-    sigma: float  # σ of the window, µm, which sets the width of order 0
+    # σ of the window, µm, times the medium's index: 1/(σk) is the width of order 0, k in vacuum
+    sigma: float
     label: str  # name of the method
 
 
@@ -185,7 +194,7 @@ def ridge_of(
     lobe = _ORDER_0 / (response.sigma * wavenumber(response.wavelengths))[:, None]
     allowed = u[None, :] > lobe
     if period is not None:
-        expected = abs(order) * response.wavelengths[:, None] * 1e-3 / period
+        expected = abs(order) * response.beam.waves(response.wavelengths)[:, None] / period
         allowed &= u[None, :] > np.minimum(expected / within, expected - lobe)
         allowed &= u[None, :] < np.maximum(expected * within, expected + lobe)
     values = np.where(allowed, response.values, -1.0)
@@ -212,9 +221,9 @@ def ridge_of(
 def find_period(response: Response, expected: Sequence[float], order: int = 1) -> float | None:
     """Return the period of the strongest ridge that obeys the grating equation, µm, or None.
 
-    An order of a grating has one u/λ at all wavelengths. So the response is averaged over the
-    wavelengths at each u/λ. The ridge is the u/λ with the largest share of the light on the order's
-    side, among those whose lobe is brighter than its surroundings.
+    An order of a grating has one u/λ at all wavelengths in the medium. So the response is averaged
+    over the wavelengths at each u/λ. The ridge is the u/λ with the largest share of the light on
+    the order's side, among those whose lobe is brighter than its surroundings.
 
     Raises a DiffractionError if `order` is 0.
 
@@ -223,8 +232,9 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
         of a small rough patch obey the equation, too, and one of them is the brightest.
     """
     u = _frequencies(response, order)
-    wavelengths = response.wavelengths * 1e-3
-    first = _ORDER_0 / (2.0 * np.pi * response.sigma)
+    wavelengths = response.beam.waves(response.wavelengths)
+    sigma = response.sigma / response.beam.index
+    first = _ORDER_0 / (2.0 * np.pi * sigma)
     last = u.max() / wavelengths.min()
     if not last > first:
         return None
@@ -240,7 +250,7 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
     if seen.sum() < FEWEST:
         return None
     lines, light = lines[seen], np.nanmean(light[:, seen], axis=0)
-    share, ratio = _contrast(lines, light, response.sigma)
+    share, ratio = _contrast(lines, light, sigma)
     periods = abs(order) / lines
     known = np.reshape(expected, (-1, 1))
     agrees = (periods < _AGREES * known) & (periods * _AGREES > known)
@@ -286,7 +296,7 @@ def _frequencies(response: Response, order: int) -> Real:
 
 
 def fit_period(ridge: Ridge) -> Fit:
-    """Fit the period d whose |mλ/d| is closest to the ridge's |u|.
+    """Fit the period d whose |mλ/(n d)| is closest to the ridge's |u|.
 
     The fit is by least squares in u, soft L1 beyond the width of a lobe, since the ridge of an
     irregular patch may jump between speckles at some wavelengths.
@@ -301,7 +311,7 @@ def fit_period(ridge: Ridge) -> Fit:
             f"side of order {ridge.order}, too few to fit a period to (at least {FEWEST}); widen "
             "the ranges of angles and wavelengths, or choose another order"
         )
-    abscissa = abs(ridge.order) * response.wavelengths[fitted] * 1e-3
+    abscissa = abs(ridge.order) * response.beam.waves(response.wavelengths[fitted])
     u = ridge.frequency[fitted]
     lobe = float(np.median(1.0 / (response.sigma * wavenumber(response.wavelengths))))
     start = float(np.median(u / abscissa))

@@ -32,7 +32,7 @@ _SEED = 20140113
 class WindowFits:
     """Fits of single coherence windows."""
 
-    centres: Real  # (n, 2), centres of the windows, µm
+    centres: Real  # (n, 2), centres of the windows on the patch, µm
     fits: tuple[Fit | None, ...]  # one for each window; `None` with too few maxima
     independent: float  # number of windows on the patch that do not overlap, at least 1
 
@@ -74,7 +74,7 @@ def window_fits(
 
     Parameters
     ----------
-    table : table with coherence="patch".
+    table : table with coherence="patch", of lengths times the index of the beam's medium.
     period : µm; ridges are searched at periods up to 1.5 times larger or smaller.
     """
     if not 1 <= count <= MOST_WINDOWS:
@@ -99,7 +99,7 @@ def window_fits(
         )
     # powers of two windows at a distance r are correlated by exp(−r²/2σ²), whose area is 2πσ²
     independent = max(1.0, float(np.prod(extent)) / (2.0 * math.pi * table.sigma**2))
-    return WindowFits(centres, tuple(fits), independent)
+    return WindowFits(centres / beam.index, tuple(fits), independent)
 
 
 def _lattice(count: int) -> Real:
