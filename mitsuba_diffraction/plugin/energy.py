@@ -92,7 +92,8 @@ class EnergyModel:
         materials = self._materials_of(factors.centre, self._range)
         self._both_sides = isinstance(materials[0], conserved.Transmitter)
         self._energies = [
-            Energy(table, material, wavelengths, factors.least) for material in materials
+            Energy(table, material, wavelengths, factors.least, self.beneath)
+            for material in materials
         ]
         if self.conserving:
             nodes, scales = self._nodes(_scales_of)

@@ -104,7 +104,8 @@ VISIBLE = (376.0, 744.0)
 
 _FINE = 0.0004  # of ln λ, for the integrals of s̄
 _BLOCK = 1 << 23  # numbers at a time: neither they nor their taps take more than 150 MB
-_MOST_TAPS = 36  # wider windows are applied to all bins at once, and then interpolated
+# Along an axis; wider windows are applied to all bins at once, and then interpolated.
+_MOST_TAPS = 10
 
 
 def lobe_of(table: DiffractionTable) -> float:
@@ -168,10 +169,10 @@ class OtherOrders:
             bins = powers[:, :, :, None]
         flat = np.ascontiguousarray(np.moveaxis(bins, 0, 2), np.float32)
         self._bins = flat.reshape(self._shape[0] * self._shape[1], -1)
-        taps_x, taps_y = table.grid.taps
-        self._smooth = taps_x * taps_y > _MOST_TAPS
-        if self._smooth:
-            self._bins = _smoothed(self._bins, self._shape, table.grid.exponents)
+        self._smooth = tuple(taps > _MOST_TAPS for taps in table.grid.taps)
+        for axis, exponent in enumerate(table.grid.exponents):
+            if self._smooth[axis]:
+                self._bins = _smoothed(self._bins, self._shape, 1 - axis, exponent)
 
     def blocks(
         self, grid: PolarGrid, band: range, azimuths: NDArray[np.int64], expansion: Expansion
@@ -237,10 +238,10 @@ class OtherOrders:
         self, position: NDArray[np.float64], last: int, taps: int, axis: int
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         """Array indices and weights of the taps along one axis, both (points, taps)."""
-        if self._smooth:
+        if self._smooth[axis]:
             taps = 4
         lowest, distance = taps_at(position, last, taps)
-        if self._smooth:
+        if self._smooth[axis]:
             weights = _cubic(distance[:, 1])
         else:
             weights = np.exp(-self._table.grid.exponents[axis] * distance**2)
@@ -323,14 +324,16 @@ def _run(used: NDArray[np.bool_]) -> slice:
 
 
 def _smoothed(
-    bins: NDArray[np.float32], shape: tuple[int, ...], exponents: tuple[float, float]
+    bins: NDArray[np.float32], shape: tuple[int, ...], axis: int, exponent: float
 ) -> NDArray[np.float32]:
-    """The window applied to all bins: for windows many bins wide, whose sums are smooth."""
+    """The window applied to all bins along an axis on which it is many bins wide.
+
+    Its sums are smooth there.
+    """
     image = bins.reshape(*shape, -1)
-    for axis, exponent in ((0, exponents[1]), (1, exponents[0])):
-        reach = math.ceil(4.2 / math.sqrt(exponent))
-        kernel = np.exp(-exponent * np.arange(-reach, reach + 1) ** 2).astype(np.float32)
-        image = scipy.ndimage.convolve1d(image, kernel, axis, mode="constant")
+    reach = math.ceil(4.2 / math.sqrt(exponent))
+    kernel = np.exp(-exponent * np.arange(-reach, reach + 1) ** 2).astype(np.float32)
+    image = scipy.ndimage.convolve1d(image, kernel, axis, mode="constant")
     return image.reshape(bins.shape)
 
 

@@ -32,7 +32,7 @@ from ..table import DiffractionTable
 from .build import VISIBLE, OtherOrders, PolarGrid, lobe_of, order_0_colour
 
 #: Raised whenever the same diffraction table would make another colour table.
-COLOUR_VERSION = 1
+COLOUR_VERSION = 2
 #: Largest table of colours, bytes.
 MAX_BYTES = 64_000_000
 #: Terms of the series, three colours of them and one number of padding are 16 half floats.

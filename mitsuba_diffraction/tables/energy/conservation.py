@@ -127,17 +127,23 @@ class SurfaceEnergy:
         self._grid = DirectionGrid(polar, settings.azimuthal)
         self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
 
-    def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
-        """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
+    def conservation(
+        self, wavelength_range: tuple[float, float], beneath: bool = False
+    ) -> Conservation:
+        """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds.
+
+        beneath : whether the albedo of a reflector follows a film's fringes.
+        """
         settings, grid = self._settings, self._grid
         albedo, largest = None, math.inf
+        fringes = math.ceil(self.material.phase(wavelength_range) / settings.fringe_step)
+        most_fringes = min(fringes, settings.fringes)
         if not self._both_sides:
-            albedo, largest = self._albedo(wavelength_range)
+            albedo, largest = self._albedo(wavelength_range, most_fringes if beneath else 0)
         if largest <= settings.threshold:
             return Conservation(albedo)
         count = settings.side_wavelengths if self._both_sides else settings.wavelengths
-        fringes = math.ceil(self.material.phase(wavelength_range) / settings.fringe_step)
-        nodes = spread(wavelength_range, count, max(min(fringes, settings.fringes), min(count, 4)))
+        nodes = spread(wavelength_range, count, max(most_fringes, min(count, 4)))
         lights = self._lights(nodes, grid.theta, grid.phi)
         s = np.stack(parallel(lambda light: self._solved(light()), lights))
         few = 0 < self.orders.strong <= settings.few_orders
@@ -184,13 +190,16 @@ class SurfaceEnergy:
         paths = self.material.paths(wavelengths, self.orders.least_width)
         return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
 
-    def _albedo(self, wavelength_range: tuple[float, float]) -> tuple[DirectionalTable, float]:
+    def _albedo(
+        self, wavelength_range: tuple[float, float], least: int
+    ) -> tuple[DirectionalTable, float]:
         """Return the albedo of a reflector as it is, and its largest value up to the horizon.
 
-        It has fewer directions and wavelengths than its scale.
+        It has fewer directions than its scale, and fewer wavelengths, but `least`.
         """
         coarse = self._grid.half
-        wavelengths = spread(wavelength_range, max(4, self._settings.wavelengths // 4))
+        count = max(4, self._settings.wavelengths // 4)
+        wavelengths = spread(wavelength_range, count, max(least, 2))
         theta = np.concatenate([coarse.theta, GRAZING])
         lights = self._lights(wavelengths, theta, coarse.phi)
         albedos = np.stack(parallel(lambda light: light().sent(self._ones)[0], lights))
@@ -250,12 +259,14 @@ class Energy:
     wavelength_range : nm; its ends may be one.
     stretch : least factor on lengths. A patch stretched by it is looked up with heights divided by
         it, in light of wavelengths divided by it.
+    beneath : whether light goes on to what lies beneath, by the albedo.
     """
 
     table: DiffractionTable
     material: Reflector | Transmitter
     wavelength_range: tuple[float, float]
     stretch: float = 1.0
+    beneath: bool = False
 
     def nodes(self, low: float, high: float, *, interval: bool = False) -> list[float]:
         """Return even height scales around all from low to high, for which something is made.
@@ -283,11 +294,12 @@ class Energy:
 
         def make() -> Conservation:
             light = self.wavelength_range
-            return SurfaceEnergy(self.table, self.material, height_scale, light).conservation(light)
+            surface = SurfaceEnergy(self.table, self.material, height_scale, light)
+            return surface.conservation(light, self.beneath)
 
         versions = VERSION, STRONG, MOST_STRONG
         limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
-        made_of = versions, limits, height_scale, material, self.wavelength_range
+        made_of = versions, limits, height_scale, material, self.wavelength_range, self.beneath
         key, memory = key_of(self.table.digest(), made_of), _known.setdefault(self.table, {})
         both_ways = Conservation.to_record, Conservation.from_record
         return cached("energy", key, memory, make, *both_ways)

@@ -41,6 +41,8 @@ CASES = {
     "taylor": (rough_patch((40, 48), (0.2, 0.25), 0.2), {"basis": "taylor"}),
     "patch": (rough_patch((40, 48), (0.2, 0.25), 0.4), {"coherence": "patch"}),
     "wider than its window": (rough_patch((100, 100), (0.2, 0.2), 0.3), {"coherence_width": 5.0}),
+    # the window is many orders wide along x only
+    "elongated": (rough_patch((6, 160), (0.2, 0.25), 0.3), {"coherence_width": 3.0}),
     "deep": (rough_patch((40, 48), (0.2, 0.25), 1.2, 1.2), {}),
 }
 

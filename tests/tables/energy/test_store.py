@@ -20,7 +20,9 @@ def computed(monkeypatch, tmp_path):
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     made: list[tuple[float, complex]] = []
 
-    def instead(surface: SurfaceEnergy, wavelength_range: tuple[float, float]) -> Conservation:
+    def instead(
+        surface: SurfaceEnergy, wavelength_range: tuple[float, float], beneath: bool
+    ) -> Conservation:
         height_scale = surface.orders.height_scale
         assert isinstance(surface.material, Reflector)
         made.append((height_scale, complex(surface.material.index(np.array([500.0]))[0])))
