@@ -152,12 +152,14 @@ def test_building_twice_gives_the_same_mesh() -> None:
 def test_the_scenes_hold_what_the_generator_makes(committed: tuple[str, Snake]) -> None:
     name, snake = committed
     positions, normals, uv, faces = load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply")
-    np.testing.assert_array_equal(faces, snake.body.faces)
-    # single precision, and other versions of SciPy's splines
-    np.testing.assert_allclose(positions, snake.body.positions, atol=1e-3)
-    np.testing.assert_allclose(uv, snake.body.uv, atol=1e-4)
+    assert uv is not None
     assert normals is not None
-    np.testing.assert_allclose(normals, snake.body.normals, atol=1e-2)
+    # corner by corner: a vertex at the tip belongs to no triangle, and is not read
+    made, corners = snake.body, snake.body.faces
+    # single precision, and other versions of SciPy's splines
+    np.testing.assert_allclose(positions[faces], made.positions[corners], atol=1e-3)
+    np.testing.assert_allclose(uv[faces], made.uv[corners], atol=1e-4)
+    np.testing.assert_allclose(normals[faces], made.normals[corners], atol=1e-2)
 
 
 def test_pigment_covers_the_whole_body(committed: tuple[str, Snake]) -> None:
