@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> Figures:
     grid = module.DEFAULT._replace(**arrays, **options.given(args, ["resolution"]))
     with mitsuba_warnings(), Bar(args) as bar:
         bsdf = surface_bsdf(args)
-        if "wavelengths" not in arrays:  # those of a format that the table has
+        if "wavelengths" not in arrays:  # the format has its own, of which the table has some
             lit = lit_wavelengths(bsdf.describe(), grid.wavelengths)
             if 0 < lit.sum() < lit.size:
                 grid = grid._replace(wavelengths=grid.wavelengths[lit])

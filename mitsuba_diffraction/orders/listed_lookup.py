@@ -52,7 +52,7 @@ class ListedLookup(Lookup):
 
     Orders are whole numbers, or pairs (m_x, m_y) on crossed gratings. Where directions are missing,
     an order has the efficiency of ωi or of the reversed light from ωo, which is reciprocal to it:
-    the nearer to a listed direction counts. Elements of Mueller matrices are those of ωi.
+    the nearer to a listed direction counts. Mueller matrices belong to ωi.
 
     Attributes
     ----------

@@ -91,9 +91,10 @@ class EnergyModel:
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
         materials = self._materials_of(factors.centre, self._range)
         self._both_sides = isinstance(materials[0], conserved.Transmitter)
+        # many places of a film that varies, at each fringe, would take minutes
+        fringes = self.beneath and self._place is None
         self._energies = [
-            Energy(table, material, wavelengths, factors.least, self.beneath)
-            for material in materials
+            Energy(table, material, wavelengths, factors.least, fringes) for material in materials
         ]
         if self.conserving:
             nodes, scales = self._nodes(_scales_of)

@@ -1,7 +1,7 @@
 """Pages that the code writes: docs/commands.md, python.md and parameters.md, and tables of formats.
 
-Commands are those of the parser, names those of `md`, parameters those of the plugins' docstrings
-(`parameters`), and formats those of `info --formats`.
+The parser names the commands, `md` its functions, the plugins' docstrings the parameters
+(`parameters`), and `info --formats` the formats.
 
 python -m docs.make.figures.interfaces -o docs
 """

@@ -5,8 +5,9 @@
     python -m docs.make.figures.thesis sweeps
     python -m docs.make.figures.thesis evaluation
 
-What is written goes between markers: a table, how far each map of a sweep is from the best, and
-fitted periods. Pictures go to `images/sweep-KIND.png` and `images/evaluation.png` beside the page.
+Tables go between markers of the page: methods, the distance of each map of a sweep from the best,
+and fitted periods. Pictures go to `images/sweep-KIND.png` and `images/evaluation.png` beside the
+page.
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ def modelled(case: Case, order: Whole, model: str) -> Real:
 
 
 def _diffracted_once(case: Case, wi: Real, wo: Real, model: str) -> Real:
-    """Efficiencies of what is diffracted once under a coat, without what its face reflects."""
+    """Efficiencies of light diffracted once under a coat, without light its face reflects."""
     coat, wavelength = case.media.coat, case.light.wavelength
     assert coat is not None
     within = wavelength / coat

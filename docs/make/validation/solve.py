@@ -136,7 +136,7 @@ def main(args: argparse.Namespace) -> None:
     work, name = make(), SOLVERS[solver].name()
     paths = {file: args.output / f"{file}.npz" for file in work}
     check_outputs(list(paths.values()))
-    # neighbours differ in their media alone, and share what is solved once for all media
+    # neighbours differ in their media alone, and share the solution of the surface
     cases = [case for same in zip(*work.values(), strict=True) for case in same]
     solved: list[Solved] = []
     # Children start anew: what they inherit of BLAS's threads could not be changed

@@ -259,7 +259,7 @@ class Energy:
     wavelength_range : nm; its ends may be one.
     stretch : least factor on lengths. A patch stretched by it is looked up with heights divided by
         it, in light of wavelengths divided by it.
-    beneath : whether light goes on to what lies beneath, by the albedo.
+    beneath : whether the albedo follows fringes of a film, for light that goes on beneath.
     """
 
     table: DiffractionTable

@@ -311,7 +311,7 @@ def csv_power(path, theta, phi):
 
 @pytest.mark.parametrize("solved", [False, True], ids=["heights", "orders"])
 def test_each_wavelength_has_a_band_of_its_own(tmp_path, solved):
-    """The distance of the first two is no measure of the others, nor reaches beyond the table."""
+    """Bands differ in width, and none reaches beyond the table."""
     surface = grating(material="Al")
     if solved:
         thin_grating(1.2, counts=(4, 4, 2)).save(tmp_path / "table.nc")

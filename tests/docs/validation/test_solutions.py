@@ -45,7 +45,7 @@ KERATIN, PERFECT = Media("keratin"), Media("perfect")
 
 def needs(*modules: str):
     missing = [name for name in modules if find_spec(name) is None]
-    return pytest.mark.skipif(bool(missing), reason=f"{missing} are not installed")
+    return pytest.mark.skipif(bool(missing), reason=f"packages that are missing: {missing}")
 
 
 def kept(file: str, case: Case) -> Solved:

@@ -95,7 +95,7 @@ def test_a_crossed_grating_has_the_light_of_a_direct_solution_between_its_direct
     cell = UnitCell(field.heights, field.extent)
     # twice the resolution takes 40 times as long
     alike = problem_of(Grating(cell, material_of(1.5, RANGE), 1.0, RANGE), "auto", 3)
-    # tables of directions are not refined by the light of their error, which is solved already
+    # the light that the error was measured by is solved already, and refines no table
     shares = missed(table, alike, jobs, *diffuse_light(LIGHTS, RANGE))
     assert shares.mean() < 0.015
     assert shares.max() < 0.05
