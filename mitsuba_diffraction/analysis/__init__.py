@@ -12,7 +12,7 @@ observers      eyes of animals: sensitivities, quantum catches, contrasts
 false_colour   pictures of an eye's quantum catches
 spectral_variables  variables of spectra as biologists publish them
 angular_variables  variables of iridescence over angles (Gruson and others 2019)
-known_wavelengths  wavelengths at which a material and a pigment are known
+known_wavelengths  wavelengths at which a material, a pigment and a table are known
 crops          crops of one scan
 scans          tables and BSDFs of scans and recipes
 survey         table, map and statistics of many scans

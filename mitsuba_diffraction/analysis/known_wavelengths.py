@@ -8,6 +8,7 @@ from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.materials import PERFECT, lets_light_through, material_named
 from ..plugin.conductors import tabulated_range, unknown_conductor
+from ..plugin.description import Surface
 from ..plugin.parameters import refusal
 from ..plugin.pigment import pigment_range
 
@@ -43,3 +44,16 @@ def check_material(material: str | None, wavelengths: Real, pigment: str | None 
                 f"{name} is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
                 f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others"
             )
+
+
+def check_lit(surface: Surface, wavelengths: Real) -> None:
+    """Refuse wavelengths (n,) in nm of which a surface's table has no light."""
+    low, high = surface.lit
+    unlit = wavelengths[(wavelengths < low) | (wavelengths > high)]
+    if not unlit.size:
+        return
+    first, last = surface.orders.wavelengths if surface.solved else surface.wavelengths
+    raise DiffractionError(
+        f"wavelength {unlit[0]:g} nm: the table has {first:g} to {last:g} nm, and no light of this "
+        "one; give others, or make a table of a wider range of wavelengths"
+    )

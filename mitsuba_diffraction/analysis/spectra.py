@@ -32,7 +32,7 @@ from ..optics.mirror import horizon_correction
 from ..plugin.description import VARYING, Consumer, Description, Feature, Surface, describe
 from ..plugin.memory import upload
 from ..progress import Progress, silent
-from .known_wavelengths import check_material, known_range
+from .known_wavelengths import check_lit, check_material, known_range
 from .maps.evaluate import opaque
 from .maps.hemisphere import flat_interaction
 from .spectrometer import (
@@ -151,12 +151,7 @@ def spectrum(
         sigma = described.sigma
         if described.material:
             check_material(described.material, lam)
-        if lam.min() < (shortest := described.shortest_wavelength):
-            raise DiffractionError(
-                f"wavelength {lam.min():g} nm is below the table's shortest, {shortest:g} nm; give "
-                "longer ones, or build a table of a wider wavelength_range "
-                "(the command 'precompute')"
-            )
+        check_lit(described, lam)
     signals = _signals(bsdf, sigma, geometry, lam, before, progress)
     if relative == "white":
         half = math.radians(0.5 * acceptance)
@@ -174,8 +169,8 @@ def _usual(described: Description | None) -> Real:
     lam = np.arange(FIRST, LAST + 1.0, STEP)
     if not isinstance(described, Surface):
         return lam
-    first, last = known_range(described.material or None)
-    return lam[(lam >= max(first, described.shortest_wavelength)) & (lam <= last)]
+    (first, last), (low, high) = known_range(described.material or None), described.lit
+    return lam[(lam >= max(first, low)) & (lam <= min(last, high))]
 
 
 def check_wavelengths(wavelengths: ArrayLike) -> Real:

@@ -60,7 +60,6 @@ def run(args: argparse.Namespace) -> Figures:
 
     set_variant(args.mode)
     from ..analysis.export import rgl, scatter, zemax
-    from ..analysis.export.nodes import lit_wavelengths
 
     module: Any = {"rgl": rgl, "zemax": zemax}.get(name, scatter)
     chosen = options.given(args, ("theta", "phi", "wavelengths"))
@@ -69,7 +68,8 @@ def run(args: argparse.Namespace) -> Figures:
     with mitsuba_warnings(), Bar(args) as bar:
         bsdf = surface_bsdf(args)
         if "wavelengths" not in arrays:  # the format has its own, of which the table has some
-            lit = lit_wavelengths(bsdf.describe(), grid.wavelengths)
+            low, high = bsdf.describe().lit
+            lit = (grid.wavelengths >= low) & (grid.wavelengths <= high)
             if 0 < lit.sum() < lit.size:
                 grid = grid._replace(wavelengths=grid.wavelengths[lit])
         text = f"{args.source.name}: {bsdf.describe().text}"

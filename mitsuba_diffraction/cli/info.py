@@ -53,7 +53,15 @@ def run(args: argparse.Namespace) -> Figures:
         return _formats(args)
     if args.file is None:
         args.parser.error("name a file, or give --formats")
-    data = {"file": str(args.file), **_describe(args.file, args)}
+    from ..heights.source import Source
+
+    source = Source.of(args.file, options.load_options(args))
+    others = FileKind.TABLE, FileKind.ORDERS, FileKind.MESH, FileKind.SCENE
+    if source.kind not in others:
+        with Bar(args) as bar:
+            bar(0, 0, "reading heights")
+            source = source.read()
+    data = {"file": str(args.file), **_describe(args.file, source, args)}
     for name, kinds, what in (
         ("energy", ("table",), "a table"),
         ("albedo", ("table",), "a table"),
@@ -76,10 +84,8 @@ def run(args: argparse.Namespace) -> Figures:
         data["albedo plot"] = str(args.albedo)
     if args.picture is not None:
         from ..analysis.pictures import patches_figure
-        from ..heights.source import Source
 
-        fields = Source.of(args.file, options.load_options(args)).fields()
-        save_figure(args.picture, patches_figure(fields), dpi=80)
+        save_figure(args.picture, patches_figure(source.fields()), dpi=80)
         data["picture"] = str(args.picture)
     if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
@@ -106,11 +112,9 @@ def _formats(args: argparse.Namespace) -> Figures:
     return data
 
 
-def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.source import Source
+def _describe(file: Path, source: Source, args: argparse.Namespace) -> dict[str, Any]:
     from ..orders.file import load_orders
 
-    source = Source.of(file, options.load_options(args))
     kind = source.kind
     if source.recipe is not None:
         return _recipe(source, source.recipe, args)
@@ -171,9 +175,7 @@ def _periods(field: HeightField) -> dict[str, Any]:
 def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.coherence import resolved, width_reason
 
-    with Bar(args) as bar:
-        bar(0, 0, "making heights")
-        fields = source.fields()
+    fields = source.fields()
     settings = TableSettings(**{**source.settings, **options.table_options(args)})
     return {
         "kind": "recipe",

@@ -1,4 +1,7 @@
-"""Conversion of spectra to colours, by colour-science; no other module of the project does it.
+"""Conversion of spectra to colours; no other module of the project does it.
+
+What most processes need comes from tables of colour-science in a file, since its import takes over
+a second; the rest is computed by colour-science itself.
 
 The observer is the CIE 1931 2° standard observer, the display sRGB (IEC 61966-2-1), and the eye is
 adapted to the illuminant, so that what reflects all wavelengths alike is white, (1, 1, 1), under
@@ -8,6 +11,7 @@ each of them.
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,8 +32,16 @@ WORKING_SPACES = {
     "ACEScg": "ACEScg",
 }
 
-_OBSERVER = "CIE 1931 2 Degree Standard Observer"
-
+#: Linear sRGB of X, of Y and of Z by illuminant: the matrix of IEC 61966-2-1, after CAT02 from the
+#: illuminant to D65.
+_MATRICES = {
+    "D65": ((3.2406, -0.9689, 0.0557), (-1.5372, 1.8758, -0.2040), (-0.4986, 0.0415, 1.0570)),
+    "E": (
+        (3.1748210722005314, -0.9899325492487889, 0.06047909499102054),
+        (-1.6974555545245795, 1.9499869504250902, -0.2089180222454224),
+        (-0.4775222350011802, 0.04004474775986926, 1.1485133649443713),
+    ),
+}
 
 #: Mean wavelength of linear red, green and blue under D65, nm: ∫λ s̄ dλ / ∫s̄ dλ. A quantity that is
 #: linear in λ has its channel's value there.
@@ -56,14 +68,9 @@ def response(wavelength: ArrayLike, illuminant: str = "D65") -> NDArray[np.float
 
 def daylight(wavelength: ArrayLike) -> NDArray[np.float64]:
     """D65 of luminance 1, scaled as in renderers so that ∫ S ȳ dλ = ∫ ȳ dλ, shape of λ (nm)."""
-    import colour
-
-    observer, light = colour.MSDS_CMFS[_OBSERVER], colour.SDS_ILLUMINANTS["D65"]
-    power = np.interp(observer.wavelengths, light.wavelengths, light.values)
-    luminous = observer.values[:, 1]
+    nodes, _, luminous, _, power = _cie()
     scale = luminous.sum() / (power @ luminous)
-    lam = np.asarray(wavelength, np.float64)
-    return np.asarray(scale * np.interp(lam, observer.wavelengths, power))
+    return np.asarray(scale * np.interp(np.asarray(wavelength, np.float64), nodes, power))
 
 
 def illuminant_power(name: str, wavelength: ArrayLike) -> NDArray[np.float64]:
@@ -101,7 +108,7 @@ def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[n
     Colours outside the display's gamut have negative components; they are kept.
     """
     check_choice("illuminant", illuminant, ILLUMINANTS)
-    return xyz @ _matrix(illuminant).astype(xyz.dtype)
+    return xyz @ np.array(_MATRICES[illuminant], xyz.dtype)
 
 
 def linear_in(space: str, xyz: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -194,21 +201,14 @@ def delta_e(
 @functools.cache
 def _responses(illuminant: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Wavelengths (n,) in nm and responses (n, 3) in 1/nm."""
-    import colour  # takes over a second: only where colours are wanted
-
-    observer = colour.MSDS_CMFS[_OBSERVER]
-    nodes = np.asarray(observer.wavelengths, np.float64)
-    # D65 ends at 780 nm; beyond, where the observer sees next to nothing, it is held constant
-    light = colour.SDS_ILLUMINANTS[illuminant]
-    power = np.interp(nodes, light.wavelengths, light.values)
-    values = power[:, None] * observer.values
+    nodes, *observer, daylit = _cie()
+    power = {"D65": daylit, "E": np.full_like(nodes, 100.0)}[illuminant]
+    values = power[:, None] * np.stack(observer, axis=-1)
     return nodes, values / (values[:, 1].sum() * (nodes[1] - nodes[0]))
 
 
 @functools.cache
-def _matrix(illuminant: str) -> NDArray[np.float64]:
-    """M with rgb = xyz @ M, the adaptation from the illuminant to D65 included."""
-    import colour
-
-    white = colour.CCS_ILLUMINANTS[_OBSERVER][illuminant]
-    return np.asarray(colour.XYZ_to_sRGB(np.eye(3), white, apply_cctf_encoding=False))
+def _cie() -> list[NDArray[np.float64]]:
+    """Columns (n,) of the file: wavelengths in nm, x̄, ȳ, z̄, and the power of D65."""
+    file = Path(__file__).with_name("cie.csv")
+    return list(np.loadtxt(file, delimiter=",", skiprows=3, unpack=True, encoding="utf-8"))

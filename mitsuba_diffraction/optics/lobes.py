@@ -33,8 +33,11 @@ def lobe_means(width: float, radius: Real) -> LobeMeans:
     places, at_horizon = _lobes(width)
     means = LobeMeans(np.ones_like(radius), cosine, 1.0 / cosine)
     below = radius > places[0]
+    place = (radius[below] - places[0]) * ((len(places) - 1) / (places[-1] - places[0]))
+    lower = np.minimum(place.astype(np.int32), len(places) - 2)
+    share = np.minimum(place - lower, 1.0)
     for mean, cut in zip(means, at_horizon, strict=True):
-        mean[below] = np.interp(radius[below], places, cut)
+        mean[below] = cut[lower] + (cut[lower + 1] - cut[lower]) * share
     return means
 
 

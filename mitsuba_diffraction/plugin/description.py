@@ -199,9 +199,13 @@ class Surface:
         return sigma_of(self.coherence_width)
 
     @property
-    def shortest_wavelength(self) -> float:
-        """Shortest wavelength that the table serves, nm; 0 for solved orders."""
-        return 0.0 if self.solved else self.patch.wavelength_range[0]
+    def lit(self) -> tuple[float, float]:
+        """Wavelengths between which the surface has light, nm.
+
+        A table of heights serves all light above its shortest wavelength.
+        """
+        low, high = self.wavelengths
+        return low, high if self.solved else math.inf
 
     @property
     def wavelengths(self) -> tuple[float, float]:

@@ -101,7 +101,7 @@ def check_bands(bands: SensorBands, surfaces: Mapping[str, Sequence[Surface]]) -
     """
     first = min(bands.first, SHORTEST_WAVELENGTH)
     for name, described in surfaces.items():
-        shortest = max(surface.shortest_wavelength for surface in described)
+        shortest = max((s.lit[0] for s in described if not s.solved), default=0.0)
         if shortest > first:
             raise DiffractionError(
                 f"{name}: the table begins at {shortest:g} nm, and the eye sees from {first:g} nm; "

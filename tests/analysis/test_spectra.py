@@ -171,7 +171,11 @@ def test_wavelengths_beyond_a_metal_s_table_are_refused():
 
 def test_what_a_table_does_not_hold_is_refused():
     surface = load(FLAT, coherence_width=10.0)
-    with pytest.raises(md.DiffractionError, match="shortest, 360"):
+    with pytest.raises(md.DiffractionError, match="320 nm: the table has 360 to 830"):
         md.spectrum(surface, wavelengths=[320.0, 400.0])
+    orders = load(md.OrderTable.mirror(0.6))
+    with pytest.raises(md.DiffractionError, match="900 nm: the table has 380 to 780"):
+        md.spectrum(orders, wavelengths=[600.0, 900.0])
+    assert (md.spectrum(orders).value > 0.0).all()
     with pytest.raises(md.DiffractionError, match="relative"):
         md.spectrum(surface, relative="grey")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import colour
 import numpy as np
 import pytest
 
@@ -32,6 +33,19 @@ def test_the_white_points_are_the_published_ones(illuminant, x, y):
     xyz = response(EVERY_NM, illuminant).sum(axis=0)
     # CIE 15:2004, table T.3; the observer's own sums are 1/3 to within 5e-5
     np.testing.assert_allclose(xyz[:2] / xyz.sum(), (x, y), atol=5e-5)
+
+
+@pytest.mark.parametrize("illuminant", ILLUMINANTS)
+def test_the_tables_are_those_of_colour_science(illuminant):
+    name = "CIE 1931 2 Degree Standard Observer"
+    observer, light = colour.MSDS_CMFS[name], colour.SDS_ILLUMINANTS[illuminant]
+    power = np.interp(observer.wavelengths, light.wavelengths, light.values)
+    expected = power[:, None] * observer.values
+    found = response(observer.wavelengths, illuminant)
+    np.testing.assert_allclose(found * expected[:, 1].sum(), expected, rtol=1e-13)  # rounding
+    white = colour.CCS_ILLUMINANTS[name][illuminant]
+    matrix = colour.XYZ_to_sRGB(np.eye(3), white, apply_cctf_encoding=False)
+    np.testing.assert_allclose(linear_srgb(np.eye(3), illuminant), matrix, atol=1e-15)
 
 
 def test_the_observer_is_brightest_at_555_nm_and_blind_beyond_the_visible():

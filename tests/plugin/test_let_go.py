@@ -12,7 +12,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics.colour import response
 from tests.support.directions import rough_patch
 from tests.support.kinds import KINDS, MIX, THROUGH, made
 from tests.support.plates import diffraction, plate, rendered, scene
@@ -31,7 +30,6 @@ def without_gc() -> Iterator[None]:
     """References alone free what is freed: a cycle of them would wait for a collection, and Dr.Jit
     would compile the BSDF in it into every kernel until then.
     """
-    response(np.array([550.0]))  # imports colour-science, which keeps the frames that do so
     gc.disable()
     yield
     gc.enable()

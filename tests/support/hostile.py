@@ -203,13 +203,11 @@ def _square() -> TriangleMesh:
     return TriangleMesh(positions, normals, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-# Each group runs in a copy of a process that has only imported the package, and what takes seconds
-# of colour-science's import but Matplotlib: what Mitsuba has loaded once, it loads no more.
+# Each group runs in a copy of a process that has only imported the package and SciPy: what Mitsuba
+# has loaded once, it loads no more.
 _RUNNER = """
-import contextlib, json, os, signal, sys
+import json, os, signal, sys
 import scipy.interpolate, scipy.ndimage, scipy.spatial
-with contextlib.suppress(ImportError):
-    import pandas
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.realtime.glsl import bounces, surroundings
 from tests.support.coarse import coarse_energy

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.special import ndtri
 
@@ -32,6 +31,7 @@ from ...orders.lookup import Arrays
 from ...plugin.description import VARYING, Consumer, Feature, Surface
 from ...plugin.memory import upload
 from ...progress import Progress
+from ..known_wavelengths import check_lit
 from ..maps.evaluate import opaque
 from ..maps.hemisphere import flat_interaction, polar, sub_samples
 
@@ -214,12 +214,7 @@ def laid(
         )
     require_loaded_llvm()
     surface = FILES.described(bsdf)
-    if not (lit := lit_wavelengths(surface, grid.wavelengths)).all():
-        low, high = surface.orders.wavelengths if surface.solved else surface.wavelengths
-        raise DiffractionError(
-            f"wavelength {grid.wavelengths[~lit][0]:g} nm: the table has {low:g} to {high:g} nm, "
-            "and reflects no such light; choose others"
-        )
+    check_lit(surface, grid.wavelengths)
     lobe = 1.0 / (math.sqrt(2.0) * surface.sigma * float(wavenumber(grid.wavelengths[0])))
     solved = surface.solved and surface.nested is None and lobe < 0.5 * nodes.size
     p, q, area, number = nodes.lattice(math.inf if solved else math.sqrt(2.0) * lobe)
@@ -251,15 +246,6 @@ def laid(
         for part, areas, out in zip(light, solid, wo, strict=True):
             yield _values(nodes, part, hats @ (areas if nodes.cosine else areas * out[:, 2]))
     progress(1, 1, "evaluating")
-
-
-def lit_wavelengths(surface: Surface, wavelengths: Real) -> NDArray[np.bool_]:
-    """Return which wavelengths (n,), nm, a surface's table has light of.
-
-    Tables of heights serve all light above their shortest wavelength.
-    """
-    low, high = surface.wavelengths
-    return (wavelengths >= low) & (wavelengths <= (high if surface.solved else math.inf))
 
 
 def _values(nodes: Nodes, light: Real, weight: Real) -> Laid:

@@ -17,6 +17,7 @@ from ...plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ...plugin.memory import upload
 from ...progress import Progress, silent
 from ...tables.build.spectrum import GLOSSY_RADIUS
+from ..known_wavelengths import check_lit
 from . import hemisphere
 from .result import Bands, BrdfMap, LightDirection
 
@@ -83,11 +84,9 @@ def brdf_map(
     if (described := describe(bsdf)) is not None:
         MAPS.check(described)
     surface = described if isinstance(described, Surface) else None
-    if surface is not None and bands.low < (shortest := surface.shortest_wavelength):
-        raise DiffractionError(
-            f"{bands}: below the table's shortest wavelength, {shortest:g} nm; build a table of a "
-            "wider wavelength_range (the command 'precompute')"
-        )
+    # colours of orders that miss visible light are named when their table loads
+    if surface is not None and (bands.is_single or spectral or not surface.solved):
+        check_lit(surface, np.array([bands.low, bands.high]))
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
     sigma = None if surface is None else surface.sigma
     narrowest = 0.5 if sigma is None else 1 / (2**0.5 * sigma * float(wavenumber(bands.low)))

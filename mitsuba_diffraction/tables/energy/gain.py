@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy
+from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...optics.blend import RoughnessTable
@@ -44,21 +44,31 @@ class PathGain:
     wavenumber: float
     height_scale: float
 
-    def __call__(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
-        """Return G at cosθi, cosθo and φo − φi, which broadcast, linear between a table's nodes."""
-        cos_turn = np.cos(turn)
-        common = self.path.common(cos_i, cos_o, cos_turn)
+    def __call__(self, cos_i: Real, row: NDArray[np.integer], cos_o: Real, turn: Real) -> Real:
+        """Return G, linear between a table's nodes.
+
+        cos_i : cosθi of few directions, (t,); row : which of them.
+        cos_o, turn : cosθo and φo − φi, which broadcast with `row`.
+        """
+        cos_turn, came = np.cos(turn), cos_i[row]
+        common = self.path.common(came, cos_o, cos_turn)
         if self.path.index is None:
             return common
-        last = len(self._table)
-        rows = (
-            (1.0 - np.sqrt(1.0 - np.arccos(np.minimum(c, 1.0)) * (2.0 / np.pi))) * (last - 1)
-            for c in (cos_i, cos_o)
+        polar = len(self._table)
+        lower, share = _cell(_polar_place(cos_i) * (polar - 1), polar)
+        share = share[:, None, None]
+        pages = (self._table[lower] * (1.0 - share) + self._table[lower + 1] * share).ravel()
+        i, s = _cell(_polar_place(cos_o) * (polar - 1), polar)
+        j, t = _cell(np.arccos(cos_turn) * ((AZIMUTHS - 1) / np.pi), AZIMUTHS)
+        at = (row * polar + i) * AZIMUTHS + j
+        near, far = (
+            pages.take(at + step) * (1.0 - t) + pages.take(at + step + 1) * t
+            for step in (0, AZIMUTHS)
         )
-        at = np.broadcast_arrays(*rows, np.arccos(cos_turn) * ((AZIMUTHS - 1) / np.pi))
-        ratio = scipy.ndimage.map_coordinates(self._table, np.stack(at), order=1, mode="nearest")
-        reached = self.path.tangential(cos_i, cos_o, cos_turn) < FARTHEST
-        return np.asarray(common * ratio * reached)
+        gain = common * (near + (far - near) * s)
+        if self.path.came.index + self.path.left.index > FARTHEST:
+            gain *= self.path.tangential(came, cos_o, cos_turn) < FARTHEST
+        return np.asarray(gain)
 
     def exact(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         """Return G of a material at arrays of cosines that broadcast, computed without a table."""
@@ -97,6 +107,17 @@ class PathGain:
         common = path.common(cos_i, cos_o, cos_turn)
         ratio = 4.0 * q_i * q_o / (w**2 * common)
         return np.asarray(ratio * path.power(cos_i, cos_o, cos_turn, heights))
+
+
+def _polar_place(cosine: Real) -> Real:
+    """Return the place, 0 to 1, of cosθ among `_nodes`."""
+    return np.asarray(1.0 - np.sqrt(1.0 - np.arccos(np.minimum(cosine, 1.0)) * (2.0 / np.pi)))
+
+
+def _cell(place: Real, count: int) -> tuple[NDArray[np.int32], Real]:
+    """Return the node below places 0 … count − 1, and the share of the node above."""
+    lower = np.minimum(place.astype(np.int32), count - 2)
+    return lower, place - lower
 
 
 def thick(index: object) -> bool:

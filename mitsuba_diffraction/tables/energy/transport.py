@@ -228,17 +228,25 @@ class Transport:
         Sums over the quadrature become sums over the grid, as seen from each azimuth.
         """
         nodes, turns = self._orders.nodes, grid.turns(half.phi)
-        to_grids = [
-            (turned, grid.interpolation(nodes.theta, nodes.azimuth + offset).matrix)
-            for offset, turned in turns.offsets
-        ]
-        kernel = np.empty((half.polar + 1, half.azimuthal, grid.ones.size), np.float32)
-        for rows in _blocks(len(kernel), len(nodes.x)):
+        shape = half.polar + 1, grid.ones.size
+        kernels = []
+        for offset, turned in turns.offsets:
+            to_nodes = grid.interpolation(nodes.theta, nodes.azimuth + offset).matrix
+            kernel = np.empty((len(turned), *shape), np.float32)
+            kernels.append((turned, to_nodes.T.tocsr(), kernel))
+        for rows in _blocks(half.polar + 1, len(nodes.x)):
             pages = self._weak_pages(half.theta[rows], half.phi)
-            for sums, shares in zip(kernel[rows], pages, strict=True):
-                for turned, to_grid in to_grids:
-                    sums[turned] = shares[turned] @ to_grid
-        return lambda s: np.einsum("tpg,pg->tp", kernel, turns.seen(s))
+            for n, shares in zip(range(*rows.indices(half.polar + 1)), pages, strict=True):
+                for turned, to_grid, kernel in kernels:
+                    kernel[:, n] = (to_grid @ shares[turned].T).T
+
+        def light(s: Single) -> Single:
+            found, seen = np.empty((half.azimuthal, half.polar + 1), np.float32), turns.seen(s)
+            for turned, _, kernel in kernels:
+                found[turned] = (kernel @ seen[turned, :, None])[..., 0]
+            return found.T
+
+        return light
 
     def _weak_pages(self, theta: Real, phi: Real) -> Iterator[Single]:
         """Yield for each polar angle the shares (p, n) of the quadrature's directions.
@@ -247,7 +255,8 @@ class Transport:
         """
         mixture, k, nodes = self._orders.mixture, self._k, self._orders.nodes
         cos_i, sine = self._start(theta[:, None])
-        gain = self._gain(cos_i, nodes.cosine, nodes.azimuth)
+        rows_of = np.arange(len(theta))[:, None]
+        gain = self._gain(cos_i[:, 0], rows_of, nodes.cosine, nodes.azimuth)
         densities = [(mixture.density, gain)]
         if mixture.beats is not None:
             zeroth, _ = self._mirrored(cos_i, nodes.cosine, np.cos(nodes.azimuth))
@@ -299,14 +308,17 @@ class Transport:
         pairs = square < (1.0 + LOBE_END * self._width) ** 2
         row, column, order = np.nonzero(pairs)
         radius, azimuth = np.sqrt(square[pairs]), np.arctan2(y[pairs], x[pairs])
-        cos_i = cosines.ravel()[row]
+        cosines = cosines.ravel()
+        cos_i = cosines[row]
         visible, cos_o, pole = lobe_means(self._width, radius)
         kappa = self._kappa(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
         turn = azimuth - phi[column]
-        gain = self._gain(cos_i, cos_o, turn)
+        gain = self._gain(cosines, row, cos_o, turn)
         # G cosθ is linear in cosθ across a lobe whose mean of 1/cosθ is `pole`
         near = cos_o * pole > 1.001
-        at_horizon = LEAST_COSINE * self._gain(cos_i[near], np.asarray(LEAST_COSINE), turn[near])
+        at_horizon = LEAST_COSINE * self._gain(
+            cosines, row[near], np.asarray(LEAST_COSINE), turn[near]
+        )
         rising = np.clip(at_horizon / np.maximum(gain[near] * cos_o[near], 1e-30), 0.0, 1.0)
         gain[near] *= 1.0 + rising * (cos_o[near] * pole[near] - 1.0)
         shares = (mixture.strong_at(kappa, order) * gain * visible).astype(np.float32)

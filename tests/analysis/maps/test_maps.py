@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from mitsuba_diffraction import DiffractionError, HeightField
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError, HeightField, OrderTable
 from mitsuba_diffraction.analysis import maps
 from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, hemisphere
 from tests.support.mapped import GRATING, centres, mirror, plugin
@@ -124,7 +125,7 @@ def test_a_picture_shows_the_map_pixel_by_pixel(tmp_path):
         ({"wavelength_range": (700.0, 400.0)}, "700 to 400 nm is empty"),
         ({"wavelength_range": (0.0, 400.0)}, "0 to 400 nm is empty"),
         ({"wavelength": float("inf")}, "inf to inf nm is empty"),
-        ({"wavelength_range": (300.0, 830.0)}, "table's shortest wavelength, 360 nm"),
+        ({"wavelength_range": (300.0, 830.0)}, "wavelength 300 nm: the table has 360 to 830 nm"),
         ({"step": 471.0}, "step=471 nm does not fit the range of 360 to 830 nm"),
         ({"step": 0.0}, "step=0 nm"),
         ({"step": float("nan")}, "step=nan nm"),
@@ -141,6 +142,16 @@ def test_what_does_not_fit_is_refused(asked, text):
         brdf_map(bsdf, **asked)
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.usefixtures("variant")
+@pytest.mark.parametrize(
+    "asked", [{"wavelength": 900.0}, {"spectral": True, "wavelength_range": (300, 830)}]
+)
+def test_light_that_a_table_of_orders_lacks_is_refused(asked):
+    bsdf = mi.load_dict(md.bsdf_dict(OrderTable.mirror(0.6)))
+    with pytest.raises(DiffractionError, match=r"wavelength \d+ nm: the table has 380 to 780 nm"):
+        brdf_map(bsdf, resolution=8, samples=1, **asked)
 
 
 def test_a_variant_without_wavelengths_is_refused():

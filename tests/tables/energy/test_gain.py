@@ -27,7 +27,10 @@ def test_tables_hold_the_boundary_s_gain_in_either_order_of_directions(path):
     rng = np.random.default_rng(4)
     cos_i, cos_o = rng.uniform(0.4, 0.98, (2, 400))
     turn = rng.uniform(-np.pi, np.pi, 400)
-    expected, tabulated = gain.exact(cos_i, cos_o, np.cos(turn)), gain(cos_i, cos_o, turn)
+    expected, tabulated = (
+        gain.exact(cos_i, cos_o, np.cos(turn)),
+        gain(cos_i, np.arange(400), cos_o, turn),
+    )
     near = path.tangential(cos_i, cos_o, np.cos(turn)) < 1.9
     # linear between 37 × 37 × 25 nodes, within 73 × 73 × 25; where w is small, 1/w² is not linear
     away = near & (path.width(cos_i, cos_o) > 0.2)
