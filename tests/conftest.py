@@ -104,8 +104,9 @@ def alone() -> None:
     """
     global _left
     called = called_objects()
-    # a collection takes long: what it left last time is held by fixtures
-    if called is None or not called <= _left:
+    if called is None:  # a whole collection takes too long before every test
+        gc.collect(1)
+    elif not called <= _left:  # fixtures hold what the last collection left
         gc.collect()
         _left = called_objects() or set()
 
