@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import collections
+import ctypes
 import gc
 import os
 import re
@@ -24,6 +25,7 @@ from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energ
 from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.coarse import coarse_energy
 from tests.support.command_line import Ran
+from tests.support.kernels import Called, called_objects, compile_quickly
 from tests.support.variants import SOME, VARIANTS, obstacle, runs
 
 pytest_plugins = ["tests.support.processor_time"]
@@ -90,28 +92,23 @@ def same_cases_in_every_run() -> None:
         sys.modules[module].is_local_module_file = lambda file: False  # type: ignore[attr-defined]
 
 
-_frozen: tuple[Path, int] | None = None
+_left: set[Called] = set()
 
 
 @pytest.fixture(autouse=True)
-def alone(request: pytest.FixtureRequest) -> None:
+def alone() -> None:
     """Without the BSDFs of earlier tests.
 
     A kernel that calls BSDFs holds the code of all there are: with those of a few tests it takes
     ten times as long to compile, and it is another one whenever tests run in another order.
     """
-    global _frozen
-    here = request.path.parent, len(sys.modules)
-    if here == _frozen:
+    global _left
+    called = called_objects()
+    if called is None:  # a whole collection takes too long before every test
+        gc.collect(1)
+    elif not called <= _left:  # fixtures hold what the last collection left
         gc.collect()
-        return
-    # modules stay, later collections need not look at them; what fixtures of a module or a folder
-    # held meanwhile stays with them, until the next folder
-    if _frozen and _frozen[0] != here[0]:
-        gc.unfreeze()
-    gc.collect()
-    gc.freeze()
-    _frozen = here
+        _left = called_objects() or set()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -123,10 +120,23 @@ def ctrl_c() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def kept_memory() -> None:
+    """Memory of large arrays is used again: giving it back takes a tenth of the tests' time.
+
+    Only where the library of C has the function, as on Linux.
+    """
+    if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "mallopt"):
+        for option, value in ((_TRIM_THRESHOLD, 2**30), (_MMAP_THRESHOLD, 2**28), (_ARENAS, 2)):
+            library.mallopt(option, value)
+
+
+# of glibc's malloc.h
+_TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENAS = -1, -3, -8
+
+
+@pytest.fixture(scope="session", autouse=True)
 def own_vectors() -> int:
     """Compile kernels quickly; returns how many lanes the vectors of child processes have."""
-    from tests.support.kernels import compile_quickly
-
     return compile_quickly()
 
 
@@ -228,12 +238,18 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(f"skipped {count:4d}: {reason}")
 
 
-@pytest.fixture(params=SOME)
-def every_variant(request: pytest.FixtureRequest) -> str:
-    """A variant of each backend, way of colour and polarisation in turn, set."""
+@pytest.fixture(scope="module", params=SOME)
+def one_of_some(request: pytest.FixtureRequest) -> str:
+    """Name of a variant: tests of a module follow in its order, a change takes 0.1 s."""
     if not runs(request.param):
         pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
+    return str(request.param)
+
+
+@pytest.fixture
+def every_variant(one_of_some: str) -> str:
+    """A variant of each backend, way of colour and polarisation in turn, set."""
     import mitsuba as mi
 
-    mi.set_variant(request.param)
-    return str(request.param)
+    mi.set_variant(one_of_some)
+    return one_of_some

@@ -52,7 +52,7 @@ def test_content_decides_before_the_suffix(tmp_path, content, kind):
 
 def test_tables_are_told_from_pictures_and_other_netcdf(tmp_path):
     DiffractionTable.build(PATCH, **DEFAULTS).save(tmp_path / "table.exr")
-    thin_grating().save(tmp_path / "orders.nc")
+    thin_grating(0.6, counts=(2, 2, 1)).save(tmp_path / "orders.nc")
     Image.fromarray(np.zeros((4, 4), np.uint8)).save(tmp_path / "a.tif")
     for name, kind in [
         ("table.exr", FileKind.TABLE), ("orders.nc", FileKind.ORDERS), ("a.tif", FileKind.IMAGE),

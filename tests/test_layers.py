@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import ast
-import functools
+import re
 from collections.abc import Iterator
 from fnmatch import fnmatch
 from pathlib import Path
@@ -64,22 +63,16 @@ def test_circles_are_found():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [{"b", "c"}]
 
 
-@functools.cache
-def parsed(file: Path) -> ast.Module:
-    """The syntax tree of a file."""
-    return ast.parse(file.read_text("utf-8"))
-
-
 def imported(file: Path) -> Iterator[str]:
-    """Modules of the tests that a file imports."""
-    for node in ast.walk(parsed(file)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name.startswith("tests."))
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            if node.module == "tests":
-                yield from (f"tests.{alias.name}" for alias in node.names)
-            elif node.module.startswith("tests."):
-                yield node.module
+    """Modules of the tests that a file imports, by its lines: syntax trees take a second."""
+    for module, names in _IMPORT.findall(file.read_text("utf-8")):
+        if module == "tests":
+            yield from (f"tests.{name}" for name in re.findall(r"\w+", names))
+        else:
+            yield module
+
+
+_IMPORT = re.compile(r"^\s*(?:from|import) (tests\b[\w.]*)(?: import (.+))?", re.M)
 
 
 def test_tests_import_helpers_and_never_one_another():

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 import re
 import sys
@@ -103,8 +104,9 @@ def _main(argv: Sequence[str] | None) -> int:
         return _run(args)
 
 
+@functools.cache
 def build_parser() -> argparse.ArgumentParser:
-    """Build the parser with all sub-commands."""
+    """Build the parser with all sub-commands, once: commands leave its defaults as they are."""
     parser = _Parser(
         prog=PROGRAM, description="Diffraction of measured height fields, for Mitsuba 3."
     )

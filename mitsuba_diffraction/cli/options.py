@@ -171,7 +171,7 @@ class Command:
     def add_to(self, subparsers: argparse._SubParsersAction[Any]) -> None:
         """Add the parser of the command."""
         parser = subparsers.add_parser(self.name, help=self.help, description=self.description)
-        parser.set_defaults(run=self.run, parser=parser)
+        parser.set_defaults(run=lambda args: self.run(args), parser=parser)
         add_options(parser, *self.rows)
 
 

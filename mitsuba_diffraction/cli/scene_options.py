@@ -104,13 +104,13 @@ def put_on_stage(args: argparse.Namespace) -> None:
             f"'{args.scene}' is a mesh: say which surface it has, --patch FILE (heights, recipe "
             "or table) or --preset NAME"
         )
-    args.parameters.append(("mesh", str(readable_file(args.scene).absolute())))
+    args.parameters = [*args.parameters, ("mesh", str(readable_file(args.scene).absolute()))]
     if args.patch is not None:
-        args.parameters.append(("patch", str(readable_file(args.patch).absolute())))
+        args.parameters = [*args.parameters, ("patch", str(readable_file(args.patch).absolute()))]
     else:
         _change_looks(args)
     if args.patch is None and SURFACE not in ids and "others" not in dict(args.parameters):
-        args.parameters.append(("others", "own"))
+        args.parameters = [*args.parameters, ("others", "own")]
     args.scene = STUDIO
 
 

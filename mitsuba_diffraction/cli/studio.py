@@ -80,7 +80,7 @@ def take_studio(args: argparse.Namespace) -> None:
         values["height_scale"] = f"{args.height_scale:g}"
     if args.orbit:
         own = is_mesh or "camera_azimuth" in (parameters_of(args.scene) or {})
-        args.turn.append("camera_azimuth" if own else ORBIT)
+        args.turn = [*args.turn, "camera_azimuth" if own else ORBIT]
         args.frames = args.frames or _FRAMES
     if is_mesh and {"turn", "camera_azimuth"} & set(args.turn):
         values["frame"] = "turning"

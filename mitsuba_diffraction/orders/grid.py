@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,34 +83,33 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -
     if table.block:
         counts = Counts(*(n - 1 for n in table.bands[0].counts))
 
-    at_nodes: list[Real] = []
-
-    def records(of: Kind) -> Real:
+    def efficiencies(of: Kind) -> list[Real]:
         if table.block:
-            return corner_records(blocks.reduced(table, table.bands[of.band], of.kind))
+            return [blocks.reduced(table, table.bands[of.band], of.kind)]
         of_kind = rows(table, of, counts, coated=coated)
-        parts = of_kind if coated and table.superstrate != 1.0 else of_kind[:1]
-        missing = -parts[-1].shape[-1] % 8
-        at_nodes.append(np.pad(parts[-1], [(0, 0)] * 4 + [(0, missing)]).reshape(-1, 8))
-        return np.concatenate([corner_records(part) for part in parts], axis=-1)
+        return list(of_kind if coated and table.superstrate != 1.0 else of_kind[:1])
 
-    def nodes(of: Kind) -> Real:
+    def matrices(of: Kind) -> Real:
         values = table.bands[of.band].kind(of.kind).astype(np.float64)
         if values.shape[-1] == MUELLER:
             values = smooth_elements(table, of.band, values)
         return resampled(table, of.band, values, counts, coated).reshape(-1, values.shape[-1])
 
+    def at_nodes(efficiencies: Real) -> Real:
+        missing = -efficiencies.shape[-1] % 8
+        return np.pad(efficiencies, [(0, 0)] * 4 + [(0, missing)]).reshape(-1, 8)
+
     kinds = list(kinds_of(table))
-    starts, corners = _joined(list(map(records, kinds)))
-    matrices, element_starts = None, starts
+    parts = list(map(efficiencies, kinds))
+    starts, corners, scale = _corners(parts)
+    grid = OrderGrid(counts, starts, corners, None, starts, scale)
     if elements and table.response.elements > 1:
-        element_starts, matrices = _joined(list(map(nodes, kinds)))
-    grid = _scaled(counts, starts, corners, matrices, element_starts)
-    if not chances or table.block:
-        return grid
-    chance_starts, values = _joined(at_nodes)
-    stored = (values / grid.scale).astype(np.float32)
-    return grid._replace(chances=stored, chance_starts=chance_starts)
+        element_starts, stored = _joined(map(matrices, kinds), scale)
+        grid = grid._replace(elements=stored, element_starts=element_starts)
+    if chances and not table.block:
+        chance_starts, stored = _joined((at_nodes(of_kind[-1]) for of_kind in parts), scale)
+        grid = grid._replace(chances=stored, chance_starts=chance_starts)
+    return grid
 
 
 def _listed(table: OrderTable, response: ListedResponse, elements: bool) -> OrderGrid:
@@ -121,9 +121,11 @@ def _listed(table: OrderTable, response: ListedResponse, elements: bool) -> Orde
             parts = [np.repeat(part, 2, axis=axis) for part in parts]
     shape = parts[0].shape
     counts, starts = Counts(*(n - 1 for n in shape[:3])), np.zeros(1, np.uint32)
-    matrices = parts[0].reshape(-1, shape[-1]) if elements and shape[-1] > 1 else None
-    records = np.concatenate([corner_records(part[..., 0]) for part in parts], axis=-1)
-    return _scaled(counts, starts, records, matrices, starts)
+    _, corners, scale = _corners([[part[..., 0] for part in parts]])
+    matrices = None
+    if elements and shape[-1] > 1:
+        matrices = (parts[0].reshape(-1, shape[-1]) / scale).astype(np.float32)
+    return OrderGrid(counts, starts, corners, matrices, starts, scale)
 
 
 def _without_anomalies(table: OrderTable, response: ListedResponse) -> Real:
@@ -146,34 +148,39 @@ def _without_anomalies(table: OrderTable, response: ListedResponse) -> Real:
     return blocks.divided(turned, scale[:, :, :, None], known)
 
 
-def _scaled(
-    counts: Counts, starts: NDArray[np.uint32], corners: Real, elements: Real | None,
-    element_starts: NDArray[np.uint32],
-) -> OrderGrid:  # fmt: skip
-    scale = half_scale(corners)
-    stored = None if elements is None else (elements / scale).astype(np.float32)
-    return OrderGrid(
-        counts, starts, (corners / scale).astype(np.float32), stored, element_starts, scale
-    )
+def _corners(kinds: list[list[Real]]) -> tuple[NDArray[np.uint32], NDArray[np.float32], float]:
+    """Return the first record of each kind, all records at corners, and the scale of both.
 
-
-def half_scale(values: NDArray[Any]) -> float:
-    """Return the power of two by which numbers are divided before they are stored."""
-    return float(2.0 ** math.ceil(math.log2(max(float(values.max()), 1e-30) / _LARGEST)))
-
-
-def corner_records(values: Real) -> Real:
-    """Return efficiencies (…, ports), then their sum, at the corners of all cells, (n, 8).
-
-    CellResponse lie along the first three axes; corners are 000, 001, 010 … 111.
+    kinds : of each kind its parts, efficiencies (τ, ρ, w, …, ports) at nodes; their sums follow
+        the ports. Corners of a cell are 000, 001, 010 … 111.
     """
-    whole = np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
-    pairs = itertools.product((slice(-1), slice(1, None)), repeat=3)
-    return np.stack([whole[pair] for pair in pairs], axis=-1).reshape(-1, 8)
+    nodes = [[_with_sum(part) for part in parts] for parts in kinds]
+    largest = max(float(part.max()) for parts in nodes for part in parts)
+    scale = 2.0 ** math.ceil(math.log2(max(largest, 1e-30) / _LARGEST))
+    shapes = [(*(n - 1 for n in part.shape[:3]), *part.shape[3:]) for part, *_ in nodes]
+    sizes = list(map(math.prod, shapes))
+    records = np.empty((sum(sizes), len(nodes[0]), 8), np.float32)
+    pairs = list(itertools.product((slice(-1), slice(1, None)), repeat=3))
+    of_kinds = np.split(records, np.cumsum(sizes)[:-1])
+    for parts, shape, of_kind in zip(nodes, shapes, of_kinds, strict=True):
+        for n, part in enumerate(parts):
+            stored = (part / scale).astype(np.float32)
+            for corner, pair in enumerate(pairs):
+                of_kind[:, n, corner].reshape(shape)[...] = stored[pair]
+    return _starts(sizes), records.reshape(len(records), -1), scale
 
 
-def _joined(parts: list[Real]) -> tuple[NDArray[np.uint32], Real]:
-    """Return the first record of each kind of each band, and all records of the kinds."""
-    parts[1:1] = [parts[0][:0]]  # kind B of band 0 has none
-    starts = np.cumsum([0, *map(len, parts[:-1])])
-    return starts.astype(np.uint32), np.concatenate(parts)
+def _with_sum(values: Real) -> Real:
+    """Return efficiencies (…, ports) followed by their sum."""
+    return np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+
+
+def _joined(kinds: Iterable[Real], scale: float) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+    """Return the first record of each kind, and the records (n, …) of all, over the scale."""
+    stored = [(records / scale).astype(np.float32) for records in kinds]
+    return _starts(list(map(len, stored))), np.concatenate(stored)
+
+
+def _starts(records: list[int]) -> NDArray[np.uint32]:
+    """Return the first record of each kind of each band; kind B of band 0 has none."""
+    return np.cumsum([0, records[0], 0, *records[1:]])[:-1].astype(np.uint32)

@@ -127,18 +127,19 @@ class HalfFloats:
     """
 
     def __init__(self, records: NDArray[Any]) -> None:
-        records = np.pad(records, [(0, 0), (0, records.shape[1] % 2)]).astype(np.float16)
-        self.numbers = records.shape[1]
+        self.numbers = records.shape[1] + records.shape[1] % 2
+        halves = np.zeros((len(records), self.numbers), np.float16)
+        halves[:, : records.shape[1]] = records
         self._size = min(packet_size(self.numbers // 2), PACKET // 2)
         self.scale = 2.0**112 if dr.is_jit_v(mi.Float) else 1.0
         if not dr.is_jit_v(mi.Float):
-            self._words: Buffer = records.astype(np.float32).ravel()
+            self._words: Buffer = halves.astype(np.float32).ravel()
             return
-        bits = records.view(np.uint16)
-        bits = np.where((bits & 0x7C00) == 0, np.uint16(0), bits)
+        bits = halves.view(np.uint16)
+        bits *= (bits & 0x7C00) != 0
         # a packet of words holds so many numbers in its lower halves, the next in its upper
-        pairs = bits.reshape(-1, 2, self._size).swapaxes(1, 2)
-        self._words = upload(mi.Int32, np.ascontiguousarray(pairs).view(np.int32))
+        lower, upper = np.moveaxis(bits.reshape(-1, 2, self._size), 1, 0)
+        self._words = upload(mi.Int32, np.stack([lower, upper], axis=-1).view(np.int32))
 
     def words(self, index: Index, active: Mask = True) -> list[Packet]:
         """Gather the words of the record with this index, in packets."""

@@ -27,7 +27,9 @@ LAM = np.array([420.0, 500.0, 580.0, 660.0])
 FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
 
 
-@pytest.fixture(params=["llvm_ad_spectral", "llvm_ad_spectral_polarized"], autouse=True)
+@pytest.fixture(
+    scope="module", params=["llvm_ad_spectral", "llvm_ad_spectral_polarized"], autouse=True
+)
 def variant(request):
     if reason := obstacle(request.param):
         pytest.skip(reason)

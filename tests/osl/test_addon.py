@@ -22,7 +22,7 @@ from tests.support.orders import thin_grating
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An exported folder, which takes seconds: its error is measured."""
     mi.set_variant("scalar_spectral")
-    bsdf = mi.load_dict(md.bsdf_dict(thin_grating(), coherence_width=12.0))
+    bsdf = mi.load_dict(md.bsdf_dict(thin_grating(0.6, counts=(2, 2, 1)), coherence_width=12.0))
     folder = tmp_path_factory.mktemp("addon") / "exported"
     md.osl.export(bsdf, folder, "grating")
     return folder

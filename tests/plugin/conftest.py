@@ -21,10 +21,8 @@ def coarsely() -> Iterator[None]:
 
 
 @pytest.fixture
-def mono() -> Iterator[None]:
+def mono() -> None:
     """A variant of one wavelength, for short kernels."""
     if not dr.has_backend(dr.JitBackend.LLVM):
         pytest.skip("Dr.Jit finds no LLVM")
     mi.set_variant("llvm_ad_mono")
-    yield
-    mi.set_variant("llvm_ad_spectral")

@@ -18,7 +18,6 @@ LIGHT = np.array([[0.0, 1.0, 300.0, 359.0], [550.0, 831.0, 900.0, 1600.0], [3e3,
 SPECTRAL = ["scalar_spectral", "llvm_ad_spectral_polarized"]
 
 
-@pytest.mark.parametrize("variant", SPECTRAL)
 @pytest.mark.parametrize(
     "parameters",
     [
@@ -30,6 +29,7 @@ SPECTRAL = ["scalar_spectral", "llvm_ad_spectral_polarized"]
         {"eta": {"type": "irregular", "wavelengths": "500, 600", "values": "1, 1"}, "k": 5.0},
     ],
 )
+@pytest.mark.parametrize("variant", SPECTRAL)
 def test_any_wavelength_is_finite(variant, parameters):
     mi.set_variant(variant)
     bsdf = mi.load_dict(md.bsdf_dict(FLAT, coherence_width=6.4, **parameters))

@@ -174,7 +174,7 @@ def test_every_option_of_a_scene_is_described(parameters, feature, some_variant)
 
 
 def test_orders_mixes_and_other_bsdfs(some_variant):
-    sheet = mi.load_dict(md.bsdf_dict(thin_grating(thin=True)))
+    sheet = mi.load_dict(md.bsdf_dict(thin_grating(0.6, counts=(2, 2, 1), thin=True)))
     assert describe(sheet).features() == {Feature.ORDERS, Feature.TRANSMISSION}
     mix = {"type": "diffraction_mix", "a": sheet, "b": sheet, "weight_a": 0.5}
     assert {Feature.MIX, Feature.TRANSMISSION} <= describe(mi.load_dict(mix)).features()

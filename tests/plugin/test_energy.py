@@ -24,16 +24,16 @@ from tests.support.lanes import evaluated
 # the surfaces are steep on purpose
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("some_variant", "fine"),
+    pytest.mark.usefixtures("fine"),
 ]
 
 
 @pytest.mark.parametrize("base", [False, True])
-def test_white_furnace_of_a_dielectric(base):
+def test_white_furnace_of_a_dielectric(some_variant, base):
     assert_at_most_white(white_pair("rough") if base else bsdf("rough", **DIELECTRIC))
 
 
-def test_a_dielectric_is_as_it_is(coarsely):
+def test_a_dielectric_is_as_it_is(some_variant, coarsely):
     conserving, raw = (bsdf("sawtooth", **DIELECTRIC, energy_conserving=e) for e in (True, False))
     assert conserving.energy_conserving
     si = dr.zeros(mi.SurfaceInteraction3f, 1000)
@@ -45,13 +45,13 @@ def test_a_dielectric_is_as_it_is(coarsely):
     assert np.array_equal(one, other)
 
 
-def test_only_booleans_are_accepted():
+def test_only_booleans_are_accepted(some_variant):
     with pytest.raises((md.DiffractionError, RuntimeError), match="energy_conserving"):
         bsdf("sinusoid", energy_conserving="yes")
 
 
 @pytest.mark.parametrize("material", ["Al", "none"])
-def test_scales_that_come_and_go_with_the_heights_load_and_update(material, coarsely):
+def test_scales_that_come_and_go_with_the_heights_load_and_update(some_variant, coarsely, material):
     given = {"material": material, "model": "kirchhoff", "coherence_width": 18.5}
     bsdf = mi.load_dict(md.bsdf_dict(steep_sinusoid(), height_scale=0.02, **given))
     parameters = mi.traverse(bsdf)
@@ -68,27 +68,26 @@ def test_scales_that_come_and_go_with_the_heights_load_and_update(material, coar
         assert value.min() > 0.0
 
 
-@pytest.mark.parametrize(("field", "parameters"), COMBINATIONS[::4])
-def test_combinations_send_on_no_more_than_they_get(field, parameters):
-    check_combination(field, parameters)
-
-
-def test_a_film_over_next_to_no_contrast_is_finite(coarsely):
-    mi.set_variant("llvm_ad_mono")
-    film = {"int_ior": 1.01, "ext_ior": 1.0, "film_ior": 1.05, "film_thickness": 50.0}
-    mean, _ = furnace_in(bsdf("rough", material=None, **film), np.array([polar(30.0, 0.0)]), 1)
-    assert 0.0 < mean.item() < 0.1
-
-
-def test_light_before_the_table_s_wavelengths_is_0_and_infrared_light_is_looked_up(coarsely):
-    mi.set_variant("llvm_ad_spectral")
+def test_light_before_the_table_s_wavelengths_is_0_and_infrared_light_is_looked_up(
+    spectral, coarsely
+):
     wi, mirrored = polar(30.0, 0.0), polar(30.0, 180.0)
     lit = evaluated(bsdf("rough", coat_ior=None), wi, mirrored, [[300.0, 359.0, 550.0, 900.0]])
     assert np.array_equal(lit[0] > 0.0, [False, False, True, True])
 
 
-def test_nested_light_below_0_counts_as_0(coarsely):
-    mi.set_variant("llvm_ad_mono")
+@pytest.mark.parametrize(("field", "parameters"), COMBINATIONS[::4])
+def test_combinations_send_on_no_more_than_they_get(mono, field, parameters):
+    check_combination(field, parameters)
+
+
+def test_a_film_over_next_to_no_contrast_is_finite(mono, coarsely):
+    film = {"int_ior": 1.01, "ext_ior": 1.0, "film_ior": 1.05, "film_thickness": 50.0}
+    mean, _ = furnace_in(bsdf("rough", material=None, **film), np.array([polar(30.0, 0.0)]), 1)
+    assert 0.0 < mean.item() < 0.1
+
+
+def test_nested_light_below_0_counts_as_0(mono, coarsely):
     nested = {"type": "diffuse", "reflectance": {"type": "uniform", "value": -1.0}}
     beneath, alone = (bsdf("rough", **DIELECTRIC, **n) for n in ({"beneath": nested}, {}))
     wo = polar(20.0, 90.0)

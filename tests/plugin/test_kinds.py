@@ -56,8 +56,8 @@ def test_a_kind_agrees_with_itself_in_colours_without_kernels(kind):
     check(kind, 4)
 
 
-@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
 @pytest.mark.parametrize("kind", ["metal", *THROUGH, MIX])
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
 def test_directions_and_samples_are_taken_as_lists(variant, kind):
     if not runs(variant):
         pytest.skip(f"{variant} is not here")

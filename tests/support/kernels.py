@@ -1,4 +1,4 @@
-"""Kernels that LLVM compiles quickly: short vectors, no optimisation.
+"""Kernels that LLVM compiles quickly: short vectors, no optimisation; and what kernels call.
 
 Most of the tests' time would else be LLVM's. Neither changes what a kernel computes: Dr.Jit allows
 LLVM no liberties with floating-point numbers.
@@ -7,6 +7,7 @@ LLVM no liberties with floating-point numbers.
 from __future__ import annotations
 
 import ctypes
+import functools
 import os
 from pathlib import Path
 
@@ -46,17 +47,55 @@ def vectors_of(lanes: int) -> int:
 
     if not dr.has_backend(dr.JitBackend.LLVM):
         return lanes
+    library = _core()
     try:
-        library = ctypes.CDLL(str(Path(dr.__file__).with_name("libdrjit-core.so")))
         width, set_target = (
             library._Z21jit_llvm_vector_widthv,
             library._Z19jit_llvm_set_targetPKcS0_j,
         )
         described = library._Z19jit_llvm_target_cpuv, library._Z24jit_llvm_target_featuresv
-    except (OSError, AttributeError):
+    except AttributeError:
         return lanes
     for text in described:
         text.restype = ctypes.c_char_p
     before = int(width())
     set_target(*(ctypes.c_char_p(text()) for text in described), ctypes.c_uint32(lanes))
     return before
+
+
+#: Kinds of Mitsuba's objects that kernels call.
+_CALLED = b"BSDF", b"Texture", b"Emitter", b"Shape"
+
+#: Variant, kind, number and address of one of them.
+Called = tuple[str, bytes, int, int]
+
+
+def called_objects() -> set[Called] | None:
+    """Return the objects that kernels would call now; None where Dr.Jit tells of none."""
+    import mitsuba as mi
+
+    library = _core()
+    try:
+        largest = library._Z21jit_registry_id_boundPKcS0_
+        address = library._Z16jit_registry_ptrPKcS0_j
+    except AttributeError:
+        return None
+    address.restype = ctypes.c_void_p
+    numbered = (
+        (variant, kind, number, address(variant.encode(), kind, ctypes.c_uint32(number)))
+        for variant in mi.variants()
+        for kind in _CALLED
+        for number in range(1, 1 + largest(variant.encode(), kind))
+    )
+    return {entry for entry in numbered if entry[-1]}
+
+
+@functools.cache
+def _core() -> ctypes.CDLL | None:
+    """Return Dr.Jit's library, None where it has another name."""
+    import drjit as dr
+
+    try:
+        return ctypes.CDLL(str(Path(dr.__file__).with_name("libdrjit-core.so")))
+    except OSError:
+        return None

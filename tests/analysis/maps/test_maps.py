@@ -17,6 +17,7 @@ from mitsuba_diffraction import DiffractionError, HeightField, OrderTable
 from mitsuba_diffraction.analysis import maps
 from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, hemisphere
 from tests.support.mapped import GRATING, centres, mirror, plugin
+from tests.support.variants import runs
 
 # Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
@@ -105,13 +106,16 @@ def test_an_exr_has_the_largest_y_on_top_and_says_what_it_is(tmp_path):
 def test_a_picture_shows_the_map_pixel_by_pixel(tmp_path):
     result = brdf_map(mirror(), 40.0, step=47, resolution=500)  # the marks are elsewhere
     maps.save_png(result, tmp_path / "a.png", exposure=-8.0, title="mirror", notes="R = 1")
-    image = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(float)
+    image = np.moveaxis(np.asarray(Image.open(tmp_path / "a.png").convert("RGB"), np.int16), -1, 0)
     column = int(250 * (1 + LightDirection(40.0).mirror[0]))
     shown = np.rint(result.srgb(-8.0)[246:254, column - 4 : column + 4, :3] * 255)[::-1]
     assert np.ptp(shown) == 255  # the lobe, white on black
-    windows = np.lib.stride_tricks.sliding_window_view(image, (8, 8, 3))[:, :, 0]
-    differences = np.abs(windows - shown).max(axis=(2, 3, 4))
-    assert differences.min() <= 2  # rounding, of 255: somewhere it is, pixel by pixel
+    height, width = image.shape[1] - 7, image.shape[2] - 7
+    here = np.ones((height, width), bool)
+    for y, x, channel in np.ndindex(8, 8, 3):
+        there = image[channel, y : y + height, x : x + width]
+        here &= np.abs(there - int(shown[y, x, channel])) <= 2  # rounding, of 255
+    assert here.any()  # somewhere it is, pixel by pixel
 
 
 @pytest.mark.usefixtures("variant")
@@ -169,8 +173,9 @@ def test_a_variant_without_wavelengths_is_refused():
         {"illuminant": "E"},
     ],
 )
-def test_an_rgb_variant_has_no_other_light(some_variant, asked):
-    mi.set_variant(some_variant.replace("spectral", "rgb"))
+def test_an_rgb_variant_has_no_other_light(asked):
+    if not runs("llvm_ad_rgb"):
+        pytest.skip("llvm_ad_rgb is not here")
+    mi.set_variant("llvm_ad_rgb")
     with pytest.raises(DiffractionError, match="whole spectrum in daylight"):
         brdf_map(mi.load_dict({"type": "diffuse"}), resolution=8, **asked)
-    mi.set_variant(some_variant)
