@@ -62,7 +62,7 @@ def write_inputs(folder: Path) -> None:
     Image.fromarray(grey).save(folder / "scale.png")
     Image.fromarray(np.stack([grey > 127] * 3, -1).astype(np.uint8) * 255).save(folder / "logo.png")
     DiffractionTable.build(field, coherence_width=2.0, tolerance=0.05).save(folder / "t.exr")
-    thin_grating().save(folder / "orders.nc")
+    thin_grating(0.6).save(folder / "orders.nc")
     texts = {
         "scale.xml": SCENE, "light.xml": LIGHT, "mesh.ply": PLY,
         "recipe.toml": 'source = "h.npy"\npixel_size = 0.1\ncoherence_width = 2\n'
