@@ -17,18 +17,17 @@ from mitsuba_diffraction.orders.solve.accuracy import (
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of
 from mitsuba_diffraction.orders.solve.nodes import located
-from mitsuba_diffraction.orders.solve.profiles import UnitCell, blazed, lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.profiles import UnitCell, blazed, lamellar
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating
 
 pytestmark = pytest.mark.thorough
 
 RANGE, LIGHTS = (550.0, 570.0), 60
-#: Profile, material, arguments and tolerance.
+#: Profile, material, arguments and tolerance: with mirror planes and without.
 CASES = {
     "walls": (lamellar(0.8, 0.45), "Al", {}, 0.02),
     "blazed": (blazed(0.5, 0.15), "Al", {}, 0.01),
-    "sinusoidal": (sinusoidal(0.55, 0.12), "Al", {}, 0.02),
     "block": (lamellar(0.45, 0.05), 1.5, {"block": True}, 0.05),
 }
 
