@@ -24,17 +24,17 @@ from mitsuba_diffraction.orders.solve.stations import Grating
 pytestmark = pytest.mark.thorough
 
 RANGE, LIGHTS = (550.0, 570.0), 60
-#: Profile, material, arguments and tolerance: with mirror planes and without.
+#: Profile, material, arguments and settings: with mirror planes and without.
 CASES = {
-    "walls": (lamellar(0.8, 0.45), "Al", {}, 0.02),
-    "blazed": (blazed(0.5, 0.15), "Al", {}, 0.01),
-    "block": (lamellar(0.45, 0.05), 1.5, {"block": True}, 0.05),
+    "walls": (lamellar(0.8, 0.45), "Al", {}, {"tolerance": 0.02, "resolution": 14}),
+    "blazed": (blazed(0.5, 0.15), "Al", {}, {"tolerance": 0.01}),
+    "block": (lamellar(0.45, 0.05), 1.5, {"block": True}, {"tolerance": 0.05}),
 }
 
 
 def errors(name, monkeypatch):
     """Missed share of the light of a direction, in all orders and both polarisations."""
-    profile, material, arguments, tolerance = CASES[name]
+    profile, material, arguments, settings = CASES[name]
     problems = []
 
     def spy(table, problem, jobs):
@@ -43,8 +43,8 @@ def errors(name, monkeypatch):
 
     monkeypatch.setattr(orders, "measured_error", spy)
     jobs = Jobs()
-    settings = Settings(RANGE, tolerance=tolerance)
-    table = md.solve_orders(profile, material, settings=settings, jobs=jobs, **arguments)
+    how = Settings(RANGE, **settings)
+    table = md.solve_orders(profile, material, settings=how, jobs=jobs, **arguments)
     fine = replace(problems[-1], resolution=2 * problems[-1].resolution)
     rng = np.random.default_rng(77)
     radius, turn = np.sqrt(rng.random(LIGHTS)), 2.0 * np.pi * rng.random(LIGHTS)
