@@ -18,7 +18,7 @@ pytestmark = pytest.mark.thorough
 
 #: A command with each kind of input, and the suffixes of its outputs.
 COMMANDS = [
-    (RENDER, ".exr .png"), (f"{RENDER} --assign ball=t.exr", ".exr .png"),
+    (RENDER, ".exr .png"), (f"{RENDER} --assign ball=t.exr", ".exr"),
     (f"{RENDER} --assign ball=orders.nc", ".exr"),
     ("render mesh.ply --patch t.exr -m scalar_rgb -s 1 -D resx=4 -D resy=3", ".exr .png"),
     (f"{RENDER} --plan recipe.toml", ".exr"), (f"{RENDER} --frames 1 --turn width", ""),
