@@ -51,7 +51,7 @@ def test_it_renders_without_kernels(name: str, gentle: dict[str, str]) -> None:
     import mitsuba as mi
 
     mi.set_variant("scalar_spectral")
-    tiny = {"spp": "2", "resx": "24", "resy": "20"}
+    tiny = {"spp": "2", "resx": "12", "resy": "10"}
     if name in ("material_ball", "scales"):
         tiny |= {key: gentle[key] for key in ("patch", "pixel_size")}
     image = rendered(name, **tiny)
@@ -64,7 +64,7 @@ def test_heights_take_the_place_of_solved_orders(gentle: dict[str, str]) -> None
 
     mi.set_variant("scalar_spectral")
     model = "{patch},pixel_size={pixel_size},coherence_width={coherence_width},material=Al"
-    tiny = {"spp": "2", "resx": "24", "resy": "20"}
+    tiny = {"spp": "2", "resx": "12", "resy": "10"}
     image = rendered("cd", **tiny, **{"material:tracks": model.format(**gentle)})
     assert np.isfinite(image).all()
     assert image.max() > 0.0

@@ -36,7 +36,8 @@ mi.set_variant("scalar_spectral")
 for module in pkgutil.walk_packages(md.__path__, "mitsuba_diffraction."):
     if module.name != "mitsuba_diffraction.__main__":
         importlib.import_module(module.name)
-mi.load_dict(md.bsdf_dict(md.gratings.sinusoidal(1.6, 0.06, periods=2), coherence_width=2))
+grating = md.gratings.sinusoidal(1.6, 0.06, periods=2)
+mi.load_dict(md.bsdf_dict(grating, coherence_width=2, energy_conserving=False))
 sys.argv[1:] = ["precompute", "grating.toml", "-o", "grating.exr"]
 sys.exit(main())
 """

@@ -18,11 +18,12 @@ pytestmark = pytest.mark.thorough
 
 #: A command with each kind of input, and the suffixes of its outputs.
 COMMANDS = [
-    (RENDER, ".exr .png"), (f"{RENDER} --assign ball=t.exr", ".exr .png"),
+    (RENDER, ".exr .png"), (f"{RENDER} --assign ball=t.exr", ".exr"),
     (f"{RENDER} --assign ball=orders.nc", ".exr"),
     ("render mesh.ply --patch t.exr -m scalar_rgb -s 1 -D resx=4 -D resy=3", ".exr .png"),
     (f"{RENDER} --plan recipe.toml", ".exr"), (f"{RENDER} --frames 1 --turn width", ""),
-    ("plan scale.xml --paths 64", ".toml"), ("brdf-map recipe.toml --resolution 8", ".exr .png"),
+    ("plan scale.xml --paths 64", ".toml"),
+    ("brdf-map recipe.toml --resolution 8 --samples 1 --step 50", ".exr .png"),
     ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --pigment pigment.csv "
      "--material keratin", ".exr .png"),
     ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --layers layers.toml", ".exr"),

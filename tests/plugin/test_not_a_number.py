@@ -10,6 +10,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from tests.support import ROOT
+
 pytestmark = pytest.mark.thorough
 
 # In a child: a read outside the table may end the process, where memory happens to end.
@@ -17,6 +19,10 @@ PROGRAM = """
 import numpy as np, drjit as dr, warnings
 warnings.simplefilter("ignore")
 import mitsuba_diffraction as md, mitsuba as mi
+from tests.support.coarse import coarse_energy
+from tests.support.kernels import compile_quickly
+coarse_energy()
+compile_quickly()
 mi.set_variant("llvm_ad_spectral")
 heights = np.random.default_rng(0).uniform(0.0, 0.2, (300, 300))
 field = md.HeightField(heights, 0.08)
@@ -49,7 +55,7 @@ def test_an_index_is_always_in_its_range():
 
 def test_directions_that_are_no_numbers_do_not_end_the_process():
     ran = subprocess.run(
-        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=120
+        [sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, timeout=120
     )
     said = ["nan is survived", "1e30 is survived"]
     assert (ran.returncode, ran.stdout.splitlines()) == (0, said), ran.stderr

@@ -88,7 +88,8 @@ LOADS = """
 import numpy as np
 heights = 0.01 * np.sin(np.arange(64) / 64 * 2 * np.pi)[None, :] + np.zeros((64, 1))
 def check():
-    b = mi.load_dict(md.bsdf_dict(md.HeightField(heights, 0.08), coherence_width=5.0))
+    own = {'coherence_width': 5.0, 'energy_conserving': False}
+    b = mi.load_dict(md.bsdf_dict(md.HeightField(heights, 0.08), **own))
     assert 'Diffraction[' in str(b), b
 """
 
@@ -100,11 +101,16 @@ def check():
             "import mitsuba as mi; mi.set_variant('{0}'); import mitsuba_diffraction as md",
             marks=pytest.mark.thorough,
         ),
+        pytest.param(
+            "from mitsuba_diffraction import bsdf_dict; import mitsuba as mi; "
+            "mi.set_variant('{0}'); import mitsuba_diffraction as md",
+            marks=pytest.mark.thorough,
+        ),
         "import mitsuba as mi; import mitsuba_diffraction as md; mi.set_variant('scalar_rgb'); "
         "mi.set_variant('{0}'); mi.set_variant('llvm_ad_rgb'); mi.set_variant('{0}')",
         pytest.param(DISCOVERY, marks=pytest.mark.thorough),
     ],
-    ids=["variant first", "several variants", "discovered by Mitsuba"],
+    ids=["variant first", "one name first", "several variants", "discovered by Mitsuba"],
 )
 def test_the_plugin_is_there_whenever_it_is_imported(some_variant, order):
     code = f"{order.format(some_variant)}\n{LOADS}\ncheck()"

@@ -15,7 +15,6 @@ from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.plugin.dictionary import ORDERS
 from mitsuba_diffraction.plugin.presets import PATCHES, find_preset
 from scenes.make.__main__ import main as make_mesh
 from tests.support import crossed
@@ -34,7 +33,7 @@ SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--positions", "2", "--coherence-width=10"],
-    "solve": ["--period", "0.3", "--resolution", "80", "--tolerance", "0.2", *_NARROW],
+    "solve": ["--period", "0.3", "--resolution", "64", "--tolerance", "0.2", *_NARROW],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
     "export-bsdf": ["--theta", "0,40", "--phi", "0,180", "--resolution", "8"],
     "export-viewer": ["--method", "exact"],
@@ -125,15 +124,13 @@ def _smaller(command: str, rest: list[str]) -> list[str]:
     if "--block" in rest:  # by coupled waves
         return [*small, "--resolution", "10"]
     if "--thin" in rest:
-        return [*small, "--resolution", "40"]
+        return [*small, "--resolution", "32"]
     return [*_PERFECT, *small] if command == "solve" else small  # others let light through
 
 
 def small_look(command: str, value: str) -> str:
     """Value of --preset with a small patch: the tree's of that name, or a look of one period."""
     look = find_preset(value.partition(",")[0].rpartition("=")[2])
-    if look.plugin == ORDERS:
-        return value
     if command in ("brdf-map", "export-osl"):  # which take no parameters behind the name
         return "gold-foil"
     return f"{value},filename={Path('precompute', look.patch.relative_to(PATCHES)).absolute()}"
@@ -195,5 +192,13 @@ def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # a process for each `solve` would take longer to start than to solve
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
     monkeypatch.chdir(tree)
-    for words in commands(page):
-        run(words)
+    # as in a process of its own: Mitsuba looks for files where it was imported
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    resolver.prepend(str(tree))
+    mi.set_file_resolver(resolver)
+    try:
+        for words in commands(page):
+            run(words)
+    finally:
+        mi.set_file_resolver(before)

@@ -19,6 +19,7 @@ from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from tests.support.kernels import compile_quickly
 
 _SIZE, _PAGE, _BEFORE = 1 << 16, 4096, b"what was there before"
 
@@ -51,7 +52,8 @@ def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
         wavelengths=np.array([500.0, 600.0]),
     )  # fmt: skip
     table.save(scratch / "table.exr")
-    surface = mi.load_dict(md.bsdf_dict(scratch / "table.exr", material="none"))
+    raw = {"material": "none", "energy_conserving": False}
+    surface = mi.load_dict(md.bsdf_dict(scratch / "table.exr", **raw))
     triangle = TriangleMesh(np.eye(3), np.eye(3), np.eye(3)[:, :2], np.array([[0, 1, 2]]))
     found: dict[str, Callable[[Path], None]] = {
         "table.exr": table.save, "orders.nc": orders.save,
@@ -78,6 +80,7 @@ def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
 
 def main(folder: Path) -> None:
     """Mount the disk and try all writers with every number of free pages."""
+    compile_quickly()
     mi.set_variant("llvm_ad_spectral")
     warnings.simplefilter("ignore", DiffractionWarning)
     scratch, disk = folder / "scratch", folder / "disk"

@@ -150,7 +150,10 @@ def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64, within: float
         """Derivative of each pixel, forward."""
         image = picture(at, (1, 2), tuple(at))
         for other, key in keys.items():
-            dr.set_grad(parameters[key], 1.0 if other == name else 0.0)
+            # an array rather than a literal: one kernel serves all parameters
+            seed = 0.0 * dr.detach(parameters[key]) + (1.0 if other == name else 0.0)
+            dr.make_opaque(seed)
+            dr.set_grad(parameters[key], seed)
         dr.enqueue(dr.ADMode.Forward, *(parameters[key] for key in keys.values()))
         dr.traverse(dr.ADMode.Forward)
         return np.array(dr.grad(image), np.float64)

@@ -8,6 +8,7 @@ of discontinuous functions (Li 1997, JOSA A 14, 2758). The waves of a stack of l
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,10 +71,17 @@ class CrossedWaves:
         x, y = station.tangential(every)
         epsilon = station.index**2
         thickness = self.cell.depth / max(len(self._slices), 1) / station.wavelength
-        layers = ((thickness, self._modes(x, y, filled, epsilon)) for filled in self._slices)
+        layers = ((thickness, each) for each in self._each_slice(x, y, epsilon))
         top = self.cell.depth / station.wavelength
         inner = Inner(np.arange(0), 1.0, 0.0)
         return scattered((x, y), layers, epsilon, np.array(channels), top, inner)[None]
+
+    def _each_slice(self, x: Real, y: Real, epsilon: complex) -> Iterator[Modes]:
+        """Yield the modes of each slice; those of pillars and holes are solved once."""
+        for n, filled in enumerate(self._slices):
+            if n == 0 or not np.array_equal(filled, self._slices[n - 1]):
+                found = self._modes(x, y, filled, epsilon)
+            yield found
 
     def _modes(self, x: Real, y: Real, filled: Real, epsilon: complex) -> Modes:
         """Return the modes of a slice: ε is the mean for Ex and Ey, the harmonic mean for Ez."""

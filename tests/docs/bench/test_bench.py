@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.make.bench import evaluation, figures, frames, scenes, updates
+from docs.make.bench import evaluation, figures, frames, orders, scenes, survey, updates
 from docs.make.bench.__main__ import main
 from docs.make.bench.figures import Goal, Plan, Row, Section
 from tests.support.directions import rough_patch
@@ -34,6 +34,8 @@ def tiny():
         patch.setattr(evaluation, "MATERIALS", {"none": evaluation.MATERIALS["none"]})
         patch.setattr(frames, "_SHORTEST", 1e-4)
         patch.setattr(updates, "CASES", updates.CASES[:1])
+        patch.setattr(orders, "_TABLES", {"blazed grating, Al": "blazed.nc"})
+        patch.setattr(survey, "_PIXELS", 64)
         yield
 
 

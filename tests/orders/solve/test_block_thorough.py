@@ -16,7 +16,7 @@ pytest.importorskip("gratinglab")
 pytestmark = pytest.mark.thorough
 
 RANGE, INDEX = (500.0, 560.0), 1.5
-SETTINGS = Settings(RANGE, tolerance=0.1, resolution=8)
+SETTINGS = Settings(RANGE, tolerance=0.1, resolution=5)
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,8 @@ def check(found: Array, name: str, noise: Array | float = 0.0) -> None:
     assert np.all(ratio < 1.012 + noise), ratio
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+# the plugin has the width between as well
+@pytest.mark.parametrize("width", WIDTHS[::2])
 @pytest.mark.parametrize("name", MIRRORS)
 def test_the_reference_reflects_what_fresnel_says(name, width):
     _, index, coat = MIRRORS[name]
@@ -102,7 +103,7 @@ def test_the_plugin_reflects_what_fresnel_says(name, width):
     check(mean.mean(axis=0), name, 4.0 * error.mean(axis=0) + 0.01)
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", WIDTHS[::2])
 @pytest.mark.parametrize("name", MIRRORS)
 def test_glsl_reflects_what_fresnel_says(gl, name, width):
     bsdf = loaded(name, width)

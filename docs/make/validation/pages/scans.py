@@ -72,16 +72,16 @@ Within 7° of the mirror direction, light is diffracted by waves longer than a c
 *Width* is that of a lobe over the light's: the mean, and the range of 90 % of waves at random
 angles and places between orders. *Colour* is the expected value, as above. σ_l = 2σ unless said.
 
-{_estimators(lam)}
+{_estimators(lam, quick)}
 
 None of the others has both narrower lobes and truer colours. Windows of wider scans are wider than
 10 µm, with smaller errors of both."""
 
 
-def _estimators(lam: np.ndarray) -> str:
+def _estimators(lam: np.ndarray, quick: bool) -> str:
     rows = []
-    for name, each in ESTIMATORS.items():
-        widths = lobe_widths(each)
+    for name, each in list(ESTIMATORS.items())[: 2 if quick else None]:
+        widths = lobe_widths(each, 30 if quick else 300)
         low, high = np.quantile(widths, [0.05, 0.95])
         colours = [f"{seen(each, spectrum, WIDTH, d, lam).worst:.2f}" for d in (15.0, 20.0, 30.0)]
         rows.append([name, f"{widths.mean():.2f}", f"{low:.2f} to {high:.2f}", *colours])
