@@ -180,7 +180,7 @@ def test_a_termination_is_an_exit_code(child, heights):
         "import mitsuba_diffraction.cli.info as info\n"
         "info._describe = lambda *_: signal.raise_signal(signal.SIGTERM)"
     )
-    assert child(["info", heights], prelude).code == 143
+    assert child(["info", heights, "--pixel-size", "0.1"], prelude).code == 143
 
 
 @pytest.mark.parametrize("name", ["precompute", "info", "render"])
