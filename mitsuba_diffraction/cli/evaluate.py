@@ -313,7 +313,10 @@ def _windows(
     few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
     single = {**settings, "coherence": "patch"}
-    table = make("spectral", within.field(), progress=bar, **single).table  # type: ignore[attr-defined]
+    try:
+        table = make("spectral", within.field(), progress=bar, **single).table  # type: ignore[attr-defined]
+    except DiffractionError as error:  # a strip has too many orders under a window of its width
+        return [("windows", str(error))], {}
     lines: list[tuple[str, str]] = []
     more: dict[str, Any] = {}
     try:

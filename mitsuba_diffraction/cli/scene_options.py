@@ -99,10 +99,15 @@ def put_on_stage(args: argparse.Namespace) -> None:
             )
         return
     ids = [*map(_id_of, args.presets), *(name for name, _ in args.materials)]
-    if (args.patch is None and not ids) or (args.patch is not None and SURFACE in ids):
+    if args.patch is None and not ids:
         args.parser.error(
             f"'{args.scene}' is a mesh: say which surface it has, --patch FILE (heights, recipe "
             "or table) or --preset NAME"
+        )
+    if args.patch is not None and SURFACE in ids:
+        args.parser.error(
+            f"'{args.scene}' is given two surfaces, --patch {args.patch} and one by --preset or "
+            "--assign; leave one out, or name the material that the second is for, ID="
         )
     args.parameters = [*args.parameters, ("mesh", str(readable_file(args.scene).absolute()))]
     if args.patch is not None:

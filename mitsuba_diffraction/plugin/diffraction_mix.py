@@ -178,7 +178,7 @@ class DiffractionMix(PluginBSDF):
                 yield n, bsdf, ctx, first
             elif first <= ctx.component < first + bsdf.component_count():
                 context = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
-                yield n, bsdf, context, 0
+                yield n, bsdf, context, first
             first += bsdf.component_count()
 
     def _sum(

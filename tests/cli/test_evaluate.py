@@ -91,6 +91,15 @@ def test_a_patch_without_a_grating_has_no_period(run, tmp_path):
         assert np.isnan(saved["ridge"]).all()
 
 
+def test_a_strip_too_long_for_single_windows_is_fitted_all_the_same(run, tmp_path):
+    x, noise = 0.1 * np.arange(4096), np.random.default_rng(3).normal(0.0, 0.005, (64, 4096))
+    np.save(tmp_path / "strip.npy", 0.05 * np.sin(2.0 * np.pi * x / 1.6) + noise)
+    ran = run("evaluate", tmp_path / "strip.npy", "--pixel-size", "0.1", "--step", "100")
+    assert ran.code == 0, ran.err
+    assert "fitted    1" in ran.out
+    assert "windows   cannot build the table" in ran.out
+
+
 def test_the_light_comes_across_the_grooves_and_steep_slopes_are_counted(run, tmp_path):
     y, x = np.mgrid[:240, :240] * 0.08
     turn = np.radians(30.0)

@@ -63,7 +63,9 @@ def test_samples_add_up_to_the_value(variant, component):
 
     def albedo(bsdf, component=component):
         context = mi.BSDFContext(mi.TransportMode.Radiance, 0xFFFFFFFF, component)
-        _, weight = bsdf.sample(context, si, *numbers)
+        drawn, weight = bsdf.sample(context, si, *numbers)
+        if component < bsdf.component_count():
+            assert (np.array(drawn.sampled_component) == component).all()
         return spectra(weight)[:, 0]
 
     both, (back, belly) = mix(weight_back=bitmap(WEIGHTS)), map(mi.load_dict, surfaces().values())

@@ -111,7 +111,7 @@ def _changed(problem: Problem, values: Sequence[tuple[Real, Real]]) -> float:
             "light; choose materials that differ from the medium above, and layers that light "
             "passes"
         )
-    return missed / light
+    return max(missed / light, float(np.finfo(np.float32).eps))  # jobs return single precision
 
 
 def finer_problem(problem: Problem) -> Problem:

@@ -73,9 +73,10 @@ def test_without_a_surface_of_the_whole_other_materials_are_the_file_s(parameter
     assert "material:Body" in values
 
 
-def test_two_surfaces_of_the_whole_are_refused(parameters):
+def test_two_surfaces_of_the_whole_are_refused_by_name(parameters, capsys):
     with pytest.raises(SystemExit):
         parameters("--patch", "scale.npy", "--preset", "cd")
+    assert "two surfaces, --patch scale.npy and" in capsys.readouterr().err
 
 
 def test_a_sky_over_a_label_comes_with_a_floor():
@@ -140,9 +141,8 @@ def test_what_does_not_fit_is_an_error(parameters, options, said):
 
 
 @pytest.mark.parametrize(
-    "options", [["--preset", "cd", "--finish", "skin"], ["--preset", "cd", "--sun", "12"],
-                ["--preset", "cd", "--patch", "scale.npy"]],
-)  # fmt: skip
+    "options", [["--preset", "cd", "--finish", "skin"], ["--preset", "cd", "--sun", "12"]]
+)
 def test_contradictions_are_usage_errors(parameters, options):
     with pytest.raises(SystemExit):
         parameters(*options)

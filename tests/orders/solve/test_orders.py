@@ -53,6 +53,12 @@ def test_the_measured_error_is_within_the_tolerance(table):
     assert table.header["reciprocity_error"] <= SETTINGS.tolerance
 
 
+def test_a_solution_that_no_longer_changes_has_the_error_of_single_precision():
+    settings = Settings(wavelengths=(550.0, 560.0), resolution=9)
+    listed = solve_orders(sinusoidal(1.2, 0.1), "Al", theta=[0.0], step=10.0, settings=settings)
+    assert 1e-7 < listed.header["solver_error"] < 1e-6  # was 4e-35
+
+
 def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
     for x, y, lam in ((0.1, 0.2, 540.0), (-0.6, 0.3, 600.0), (0.0, 0.8, 630.0)):
         total = sum(float(table.efficiency(x, y, lam, m)) for m in range(-3, 4))
