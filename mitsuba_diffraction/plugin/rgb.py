@@ -112,6 +112,10 @@ def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
     return lower, minimum(clipped - mi.Float(lower), 1.0)
 
 
+#: Least power, 1/µm², whose root is taken; colours outside the display's gamut are negative.
+_LEAST = 1e-18
+
+
 class RGBPower:
     """The `power.SpectralPower` of variants without wavelengths, which are summed.
 
@@ -139,11 +143,14 @@ class RGBPower:
         """See `SpectralPower.power`."""
         z = pair.w * height_scale
         others, zeroth = self._lookup.others(pair.uv, z), self._lookup.zeroth(pair.uv, z)
-        if self._coherent:  # order 0 has its own power, or less where speckle is darker
-            total = others + zeroth
-            zeroth = dr.clip(total, dr.minimum(zeroth, 0.0), dr.maximum(zeroth, 0.0))
-            others = total - zeroth
-        return Powers(others, zeroth)
+        if not self._coherent:
+            return Powers(others, zeroth)
+        # the table has |o + c|² − |c|², with c of order 0: o is taken in phase with c, or opposite
+        total = others + zeroth
+        both = (total > _LEAST) & (zeroth > _LEAST)
+        apart = dr.sqrt(dr.maximum(total, _LEAST)) - dr.sqrt(dr.maximum(zeroth, _LEAST))
+        cosine = dr.select(both, dr.sign(apart), 0.0)
+        return Powers(dr.select(both, dr.square(apart), others), zeroth, cosine)
 
     def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
         """See `SpectralPower.density`."""

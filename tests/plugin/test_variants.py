@@ -7,12 +7,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionTable, gratings, reference
+from mitsuba_diffraction import DiffractionTable, HeightField, bsdf_dict, gratings, reference
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, delta_e, linear_srgb, response
 from mitsuba_diffraction.plugin import materials
 from mitsuba_diffraction.tables.colour.table import ColourTable
-from tests.support.directions import Array
-from tests.support.lanes import interaction
+from tests.support.directions import Array, polar
+from tests.support.lanes import interaction, spectra, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
 from tests.support.variants import ALL, evaluate, runs
 
@@ -124,3 +124,23 @@ def test_gold_has_the_colour_of_its_spectrum(monkeypatch: pytest.MonkeyPatch) ->
             found = np.array(load(material="Au").eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))).T
         errors.append(delta_e(truth, found, least=1e-3))
     assert np.nanmean(errors[0]) < 0.7 * np.nanmean(errors[1])
+
+
+def test_orders_of_one_window_interfere_in_grazing_light_as_in_a_spectrum() -> None:
+    """In colours as well, beats go with the factors of both: of order 0, and of the others."""
+    ramp = np.tile(np.linspace(0.0, 0.3, 50), (8, 1))
+    options = {"coherence": "patch", "coherence_width": 3.0, "material": "none"}
+    field = HeightField(ramp, 0.05, periodic=True)
+    surface = bsdf_dict(field, **options, energy_conserving=False)
+    rng, lines = np.random.default_rng(5), np.arange(378.0, 738.0, 2.0)
+    wi, wo = np.reshape([polar(*rng.uniform((75, 0), (88, 360))) for _ in range(80)], (2, 40, 3))
+    mi.set_variant("llvm_ad_spectral")
+    si = interaction(np.repeat(wi, 45, axis=0), np.tile(lines.reshape(-1, 4), (40, 1)))
+    value = mi.load_dict(surface).eval(mi.BSDFContext(), si, vectors(np.repeat(wo, 45, axis=0)))
+    colours = linear_srgb(response(lines))
+    truth = spectra(value).reshape(40, 180) @ (colours / colours.sum(axis=0))
+    mi.set_variant("llvm_ad_rgb")
+    si = interaction(wi, np.zeros((40, 4)))
+    found = np.array(mi.load_dict(surface).eval(mi.BSDFContext(), si, vectors(wo))).T
+    # rings and series of colours; 6 % with the beats' factor that of the others alone
+    assert np.abs(found - truth).mean() < 0.02 * truth.mean()
