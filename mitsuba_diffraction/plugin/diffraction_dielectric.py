@@ -261,7 +261,7 @@ class DiffractionDielectric(DiffractingSurface):
         """
         si, point = site.si, crossing.place
         power = self.power.power(point, site.scale, si)
-        if mi.is_rgb:  # a channel out of gamut stays finite where w → 0
+        if mi.is_rgb and power.cosine is None:  # a channel out of gamut stays finite where w → 0
             zeroth = dr.minimum(power.zeroth, power.others + power.zeroth)
             power = Powers(power.others + power.zeroth - zeroth, zeroth)
         per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)

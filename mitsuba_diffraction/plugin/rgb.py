@@ -150,7 +150,9 @@ class RGBPower:
         both = (total > _LEAST) & (zeroth > _LEAST)
         apart = dr.sqrt(dr.maximum(total, _LEAST)) - dr.sqrt(dr.maximum(zeroth, _LEAST))
         cosine = dr.select(both, dr.sign(apart), 0.0)
-        return Powers(dr.select(both, dr.square(apart), others), zeroth, cosine)
+        outside = dr.clip(total, dr.minimum(zeroth, 0.0), dr.maximum(zeroth, 0.0))  # of the gamut
+        others = dr.select(both, dr.square(apart), total - outside)
+        return Powers(others, dr.select(both, zeroth, outside), cosine)
 
     def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
         """See `SpectralPower.density`."""

@@ -77,7 +77,7 @@ class CrossedWaves:
         return scattered((x, y), layers, epsilon, np.array(channels), top, inner)[None]
 
     def _each_slice(self, x: Real, y: Real, epsilon: complex) -> Iterator[Modes]:
-        """Yield the modes of each slice; those of pillars and holes are solved once."""
+        """Yield the modes of each slice; equal neighbours, as in a pillar, share one solution."""
         for n, filled in enumerate(self._slices):
             if n == 0 or not np.array_equal(filled, self._slices[n - 1]):
                 found = self._modes(x, y, filled, epsilon)
