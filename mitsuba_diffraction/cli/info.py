@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> Figures:
         with Bar(args) as bar:
             bar(0, 0, "reading heights")
             source = source.read()
-    data = {"file": str(args.file), **_describe(args.file, source, args)}
+    data = {"file": str(args.file), **_describe(source, args)}
     for name, kinds, what in (
         ("energy", ("table",), "a table"),
         ("albedo", ("table",), "a table"),
@@ -112,10 +112,10 @@ def _formats(args: argparse.Namespace) -> Figures:
     return data
 
 
-def _describe(file: Path, source: Source, args: argparse.Namespace) -> dict[str, Any]:
+def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     from ..orders.file import load_orders
 
-    kind = source.kind
+    file, kind = args.file, source.kind
     if source.recipe is not None:
         return _recipe(source, source.recipe, args)
     if kind is FileKind.MESH:

@@ -8,6 +8,7 @@ import weakref
 from pathlib import Path
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,11 +16,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, bsdf_dict
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
+from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.methods import METHODS
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
@@ -48,8 +50,10 @@ from mitsuba_diffraction.tables.colour.table import ColourTable, colour_differen
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
 from mitsuba_diffraction.thesis.shaders.pack import pack_method, thesis_method
+from tests.support.directions import polar
+from tests.support.lanes import interaction, vectors
 from tests.support.patches import SMALL_SCAN
-from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
+from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed, shaded
 
 pytestmark = pytest.mark.thorough
 
@@ -212,6 +216,25 @@ def test_the_documents_methods_are_those_of_their_evaluators(
     error = np.linalg.norm((found - expected)[bright], axis=1) / norm
     # the figure asked for; a line of nmm may come or go at the very end of the range
     assert np.quantile(error, 0.98 if name == "nmm" else 1.0) < 0.01
+
+
+def test_orders_of_one_window_interfere_as_in_the_plugin(gl: Any) -> None:
+    """Up to the horizon, where beats with the factor of all orders but 0 made light."""
+    mi.set_variant("llvm_ad_rgb")
+    ramp = HeightField(np.tile(np.linspace(0.0, 0.3, 50), (8, 1)), 0.05, periodic=True)
+    bsdf = mi.load_dict(
+        bsdf_dict(
+            ramp, coherence="patch", coherence_width=3.0, material="none", energy_conserving=False
+        )
+    )
+    rng = np.random.default_rng(5)
+    wi = np.array([polar(*rng.uniform((60, 0), (88, 360))) for _ in range(200)])
+    x, y = (rng.normal(0.0, 0.1, (200, 2)) - wi[:, :2]).T
+    wo = np.stack([x, y, np.sqrt(np.maximum(1.0 - x**2 - y**2, 1e-4))], axis=1)
+    si = interaction(wi, np.zeros((200, 4)))
+    expected = np.array(bsdf.eval(mi.BSDFContext(), si, vectors(wo))).T
+    # eight digits of each number of the shader's tables, 0.1 %; 3 % with one factor for all beats
+    assert difference(shaded(gl, make_shader(bsdf, ["fast"]), wi, wo), expected) < 0.003
 
 
 def test_a_coherent_sum_is_refused_by_exact(patch: HeightField) -> None:

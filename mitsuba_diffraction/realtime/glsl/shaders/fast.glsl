@@ -98,13 +98,33 @@ vec3 order_0(float radius, float z)
     return mix(inner, outer, t.x);  // the last radius is dark
 }
 
+#ifdef COHERENT
+
+// |o + c|² of orders of one window, c of order 0, from |o + c|² − |c|² and |c|², each with its factor:
+// o is taken in phase with c, or opposite. Colours outside the gamut do not interfere.
+vec3 interfering(vec3 others, vec3 zeroth, vec3 factor, vec3 mirrored)
+{
+    const vec3 least = vec3(1e-18);
+    vec3 total = others + zeroth, outside = clamp(total, min(zeroth, 0.0), max(zeroth, 0.0));
+    vec3 apart = sqrt(max(total, least)) - sqrt(max(zeroth, least));
+    vec3 sum = apart * sqrt(factor) + sqrt(max(zeroth, least) * mirrored);
+    vec3 both = vec3(greaterThan(min(total, zeroth), least));
+    return mix((total - outside) * factor + outside * mirrored, sum * sum, both);
+}
+
+#endif
+
 // R ⟨|P|²⟩ / (4π²σ⁴ λ²) over the light's wavelengths, linear sRGB, 1/µm².
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float r = length(uv);
-    vec3 colour = other_orders(uv, r * r, z) * boundary(cos_half, r, z);
-#ifdef ORDER_0
-    colour += order_0(r, z) * mirror(cos_half, sigma_0);
+    vec3 others = other_orders(uv, r * r, z), factor = boundary(cos_half, r, z);
+#if defined(ORDER_0) && defined(COHERENT)
+    vec3 colour = interfering(others, order_0(r, z), factor, mirror(cos_half, sigma_0));
+#elif defined(ORDER_0)
+    vec3 colour = others * factor + order_0(r, z) * mirror(cos_half, sigma_0);
+#else
+    vec3 colour = others * factor;
 #endif
     colour = tinted(colour);
 #if defined(ORDER_0) && defined(COATED)
