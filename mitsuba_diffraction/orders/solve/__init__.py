@@ -34,6 +34,6 @@ from .stations import CrossedStation, Grating, Solver, Station
 
 __all__ = [
     "Chandezon", "CoupledWaves", "CrossedStation", "CrossedWaves", "Grating", "IntegralSolver",
-    "Settings", "SolvedRecipe", "Solver", "Station", "material_of", "profiles",
-    "sheet_efficiencies",
+    "Settings", "SolvedRecipe", "Solver", "Station", "jobs", "material_of",
+    "profiles", "sheet_efficiencies",
 ]  # fmt: skip
