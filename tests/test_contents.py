@@ -40,6 +40,10 @@ def test_every_name_is_a_module_or_exported(name):
     modules = {path.stem for path in folder.glob("*.py")} | {
         path.parent.name for path in folder.glob("*/__init__.py")
     }
+    imported = {
+        alias.name for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) for alias in n.names
+    }
+    assert exported <= modules | imported | {getattr(n, "name", None) for n in tree.body}
     named = contents(file)
     assert len(named) == len(set(named)) > 0
     assert set(named) <= modules | exported

@@ -1,10 +1,12 @@
-"""Imports go one way: down the layers, and never in a circle."""
+"""Imports go one way: down the layers, and never in a circle; programs import what rooms export."""
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 
 import grimp
@@ -84,6 +86,75 @@ def test_tests_import_helpers_and_never_one_another():
         if name.split(".")[1] != "support" and not ("fuzz" in file.parts and "fuzz" in name)
     ]
     assert not wrong
+
+
+@cache
+def exports(room: Path) -> set[str]:
+    """Names in `__all__` of a room's `__init__`; of the package, also its modules."""
+    text = (room / "__init__.py").read_text("utf-8")
+    listed = re.search(r"^__all__ = (\[.*?\])", text, re.M | re.S)
+    names = set(ast.literal_eval(listed[1])) if listed else set()
+    return names | ({file.stem for file in room.glob("*.py")} if room.name == PACKAGE else set())
+
+
+def hidden_by(name: str) -> Path | None:
+    """The room that does not export a dotted name, if one does not.
+
+    Sub-rooms are public; modules that a room exports are, with their names.
+    """
+    room, exported = ROOT / PACKAGE, False
+    for part in name.split(".")[1:]:
+        if re.match("_(?!_)", part):
+            return room
+        if not exported and (room / part / "__init__.py").is_file():
+            room /= part
+        elif not (exported := exported or part in exports(room) or part.startswith("__")):
+            return room
+    return None
+
+
+def names_of_the_package(source: str) -> Iterator[tuple[int, str]]:
+    """Lines and dotted names that a program imports, or reads from what it imports."""
+    bound: dict[str, str] = {}
+    nodes = list(ast.walk(ast.parse(source)))
+    for node in nodes:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            start = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+            for alias in node.names:
+                name = start + alias.name
+                if name.split(".")[0] == PACKAGE:
+                    bound[alias.asname or alias.name] = name
+                    yield node.lineno, name
+    for node in nodes:
+        if isinstance(node, ast.Attribute) and (start := bound.get(ast.unparse(node.value))):
+            yield node.lineno, f"{start}.{node.attr}"
+
+
+def test_programs_use_what_rooms_export():
+    wrong = [
+        f"{file.relative_to(ROOT)}:{line}: {name} is not in __all__ of {room.relative_to(ROOT)}: "
+        "use a name that is, move it to the programs, or export it"
+        for folder in ("docs/make", "scenes/make")
+        for file in sorted((ROOT / folder).rglob("*.py"))
+        for line, name in names_of_the_package(file.read_text("utf-8"))
+        if (room := hidden_by(name)) is not None
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_names_that_a_room_does_not_export_are_found():
+    source = """
+from mitsuba_diffraction import DiffractionTable, errors, reference as judge
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.optics.colour import delta_e, _cie
+from mitsuba_diffraction.tables.store import cached
+import mitsuba_diffraction.optics.stack as stack
+judge.brdf, judge.screens, DiffractionTable.build, judge.fresnel.amplitudes
+"""
+    hidden = [name for _, name in names_of_the_package(source) if hidden_by(name)]
+    assert [name.partition(".")[2] for name in hidden] == [
+        "optics.colour._cie", "tables.store.cached", "optics.stack", "reference.screens",
+    ]  # fmt: skip
 
 
 def test_no_test_file_lies_where_pytest_does_not_look(pytestconfig):

@@ -27,3 +27,5 @@ pictures       pictures of patches and of raw albedo
 design         surfaces from their BRDF or colours, by gradients with respect to the heights
 energy         albedo of a table's surface before and after energy conservation
 """
+
+__all__ = ["energy", "machine", "pictures", "timing"]

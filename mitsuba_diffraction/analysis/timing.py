@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-import re
 import statistics
-import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionWarning
+from ..heights.field import HeightField
 from ..plugin.dictionary import bsdf_dict
 from ..tables.table import DiffractionTable
 
@@ -27,51 +26,13 @@ Measured = TypeVar("Measured")
 WARM_UP = 2
 
 
-class KernelTime(NamedTuple):
-    """Time of the kernels of a call without tracing in Python, s.
-
-    Attributes
-    ----------
-    seconds : on the clock.
-    cpu_seconds : of all cores together, which other processes hardly change; with their start.
-    """
-
-    seconds: float
-    cpu_seconds: float
-
-
-def kernel_time(call: Callable[[], Any]) -> KernelTime:
-    """Return the time of the kernels of one call."""
-    kernels, cpu_seconds = _kernels(call)
-    return KernelTime(sum(kernel["execution_time"] for kernel in kernels) * 1e-3, cpu_seconds)
-
-
 def kernel_seconds(call: Callable[[], Any]) -> float:
     """Return the execution time of the kernels of one call, s, without tracing in Python."""
-    return kernel_time(call).seconds
-
-
-def kernel_operations(call: Callable[[], Any]) -> int:
-    """Return the number of Dr.Jit's operations in the kernels of one call, loops counted once."""
-    return sum(kernel.get("operation_count", 0) for kernel in _kernels(call)[0])
-
-
-def vector_lanes() -> int:
-    """Return how many lanes the processor's vectors have in kernels, 1 of a graphics card."""
-    kernels, _ = _kernels(lambda: dr.arange(mi.Float, 64) * 0.5)
-    widths = re.findall(r"<(\d+) x float>", kernels[0]["ir"].getvalue())
-    return max(map(int, widths), default=1)
-
-
-def _kernels(call: Callable[[], Any]) -> tuple[list[dict[str, Any]], float]:
-    """Run a call; return Dr.Jit's records of its kernels, and the processor's seconds."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
-        result = call()
-        start = time.process_time()
-        dr.eval(result)
+        dr.eval(call())
         dr.sync_thread()
-        return list(dr.kernel_history()), time.process_time() - start
+        return 1e-3 * sum(kernel["execution_time"] for kernel in dr.kernel_history())
 
 
 def rounds_of(
@@ -96,11 +57,13 @@ def ratio(a: Sequence[float], b: Sequence[float]) -> float:
     return statistics.median(x / y for x, y in zip(a, b, strict=True))
 
 
-def quiet_bsdf(table: DiffractionTable | str | os.PathLike[str], **parameters: Any) -> Any:
-    """Load the plugin with a table, without warnings about the model's limits."""
+def quiet_bsdf(
+    patch: HeightField | DiffractionTable | str | os.PathLike[str], **parameters: Any
+) -> Any:
+    """Load the plugin with a patch, without warnings about the model's limits."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
-        return mi.load_dict(bsdf_dict(table, **parameters))
+        return mi.load_dict(bsdf_dict(patch, **parameters))
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ report                 output files, checked before the work; figures as text, J
 """
 
 from .console import Bar, say_error
-from .main import main
-from .report import check_outputs
+from .main import build_parser, main
+from .report import check_outputs, save_json
 
-__all__ = ["Bar", "check_outputs", "main", "say_error"]
+__all__ = ["Bar", "build_parser", "check_outputs", "main", "save_json", "say_error"]

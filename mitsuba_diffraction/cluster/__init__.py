@@ -13,8 +13,8 @@ jobs     independent jobs, here or on workers: scans as they finish, windows in 
 workers  workers started here or found on a cluster; unsuitable ones are refused
 """
 
-from .frames import render
+from .frames import FrameRequest, FrameSequence, render
 from .jobs import build
 from .workers import connect
 
-__all__ = ["build", "connect", "render"]
+__all__ = ["FrameRequest", "FrameSequence", "build", "connect", "render"]

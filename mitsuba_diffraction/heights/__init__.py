@@ -19,10 +19,15 @@ lengths      checks of lengths, counts and other numbers that users write
 from __future__ import annotations
 
 from .field import HeightField
+from .read import LoadOptions
 from .source import Source, load, treated
-from .validity import validity
+from .spectra import order_powers
+from .validity import GENTLE_SLOPE, STEEP_SLOPE, validity
 
-__all__ = ["HeightField", "Source"]
+__all__ = [
+    "GENTLE_SLOPE", "STEEP_SLOPE", "HeightField", "LoadOptions", "Source", "coherence",
+    "order_powers",
+]  # fmt: skip
 
 # Attached here: their modules import the class, so the class cannot import them.
 HeightField.load = staticmethod(load)

@@ -18,3 +18,5 @@ colour     spectra to XYZ and sRGB; differences of colours
 materials  names and numbers of materials; published indices of tissues
 display    linear sRGB to the values of a screen, by a view
 """
+
+__all__ = ["blend", "boundary", "colour", "display", "fresnel", "geometry", "mirror"]

@@ -30,7 +30,7 @@ from .file import load_orders, save_orders
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
-__all__ = ["Band", "CellResponse", "ListedResponse", "OrderTable"]
+__all__ = ["Band", "CellResponse", "ListedResponse", "OrderTable", "cells"]
 
 # Modules that build on the class; it shall not import them
 OrderTable.efficiency = efficiency

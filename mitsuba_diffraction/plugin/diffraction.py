@@ -235,7 +235,7 @@ class Diffraction(DiffractingSurface):
         nested = read.nested_of(props, read.REFLECTING)
         coat = read.coat_of(props)
         optical = 1.0 if coat is None else plain(coat.eta)
-        super().__init__(props, nested, read.material_of(props, coat), optical)
+        super().__init__(props, nested, read.surface_material(props, coat), optical)
         self.coat = coat
         self.vcavity = choice(props, "shadowing", SHADOWINGS) == "vcavity"
         if self.coat is not None:

@@ -193,7 +193,7 @@ def model_of(props: Properties, material: Material) -> str:
 # ------------------------------------------------------------------ material and layers
 
 
-def material_of(props: Properties, coat: Dielectric | None) -> Material:
+def surface_material(props: Properties, coat: Dielectric | None) -> Material:
     """Read the structure's material: conductor, perfect mirror or dielectric, in air or a coat."""
     conductor = [n for n in ("material", "eta", "k") if n in props]
     if conductor and "int_ior" in props:

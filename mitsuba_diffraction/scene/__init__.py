@@ -25,3 +25,9 @@ stage        the studio for meshes without a scene
 planning     the recipes of tables that suffice for a scene
 orientation  directions that a patch follows over a mesh
 """
+
+from .load import load_scene, set_variant
+from .passes import Stop, render_passes
+from .pictures import read_exr
+
+__all__ = ["Stop", "hologram", "load_scene", "read_exr", "render_passes", "set_variant"]

@@ -24,12 +24,13 @@ store              the cache, of whatever can be packed into a record
 from __future__ import annotations
 
 from .build.build import build_table
+from .build.spectrum import GLOSSY_RADIUS
 from .exr import load_table, save_table
 from .lookup import brdf, window_sum
 from .source import TableSource
 from .table import DiffractionTable
 
-__all__ = ["DiffractionTable", "TableSource"]
+__all__ = ["GLOSSY_RADIUS", "DiffractionTable", "TableSource"]
 
 # Modules that build on the class; it shall not import them
 DiffractionTable.build = staticmethod(build_table)

@@ -8,3 +8,5 @@ term_images  look-up of a Taylor series as the thesis stores it
 shaders      the methods for the realtime renderer
 sweeps       BRDF maps for several values of one parameter, compared and timed
 """
+
+__all__ = ["sweeps", "term_images"]

@@ -18,9 +18,12 @@ from PIL import Image
 
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.scene.orientation.directions import direction_field
-from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, oriented_mesh
+from mitsuba_diffraction.scene.orientation import (
+    TriangleMesh,
+    direction_field,
+    oriented_mesh,
+    write_ply,
+)
 
 from . import pigment
 from .anatomy import Anatomy

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
+from mitsuba_diffraction.scene.orientation import TriangleMesh, grid_faces, oriented_mesh
 
 from .limits import check_limits
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, join
+from mitsuba_diffraction.scene.orientation import TriangleMesh, grid_faces
 
 from .anatomy import Anatomy
 from .skin import Skin
@@ -184,3 +184,16 @@ def eyes(skin: Skin, rows: int = 20, columns: int = 32) -> TriangleMesh:
         uv = np.stack([polar / np.pi, azimuth / (2 * np.pi)], axis=-1).reshape(-1, 2)
         balls.append(TriangleMesh(centre + radius * normals, normals, uv, faces))
     return join(balls)
+
+
+def join(meshes: list[TriangleMesh]) -> TriangleMesh:
+    """Join meshes into one, without welding; an orientation is kept where all have one."""
+    starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
+    turns = [mesh.orientation for mesh in meshes if mesh.orientation is not None]
+    return TriangleMesh(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.uv for mesh in meshes]),
+        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]),
+        np.concatenate(turns) if len(turns) == len(meshes) else None,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.scene.orientation.trimesh import grid_faces
+from mitsuba_diffraction.scene.orientation import grid_faces
 
 from .limits import check_limits
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, cell_corners, grid_faces
+from mitsuba_diffraction.scene.orientation import TriangleMesh, cell_corners, grid_faces
 
 from .scales import Scales, smoothstep
 from .skin import Placement, Skin

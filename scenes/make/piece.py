@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
+from mitsuba_diffraction.scene.orientation import TriangleMesh
 
 from .anatomy import Anatomy
 from .limits import check_limits

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, join
+from mitsuba_diffraction.scene.orientation import TriangleMesh
 
 from . import head as ends
 from .anatomy import Anatomy
@@ -70,7 +70,7 @@ def build(
     columns = 2 * head_detail
     front = ends.head(skin, first * pitch - step, 0.3 * scales.relief * pitch, head_detail, columns)
     rear = ends.tail(skin, last * pitch + step, 0.1 * scales.relief * pitch, 12, 32)
-    body = join([front, covered.mesh, rear])
+    body = ends.join([front, covered.mesh, rear])
     n_front, n_covered = len(front.positions), len(covered.mesh.positions)
     head_ring = np.arange(n_front - columns - 1, n_front)
     tail_ring = n_front + n_covered + np.arange(33)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from docs.make.bench.kernels import kernel_operations
 from mitsuba_diffraction import DiffractionError
 from tests.support.furnace import furnace, sinusoid
 from tests.support.gentle import PATCH, WIDTH, bitmap, load, pairs
@@ -73,10 +73,7 @@ def test_without_it_kernels_have_no_operation_for_it(mono):
 
     def operations(**parameters):
         bsdf = load(**parameters)
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-            dr.kernel_history_clear()
-            dr.eval(bsdf.eval_pdf(mi.BSDFContext(), si, vectors(wo)))
-            return sum(kernel.get("operation_count", 0) for kernel in dr.kernel_history())
+        return kernel_operations(lambda: bsdf.eval_pdf(mi.BSDFContext(), si, vectors(wo)))
 
     # three multiplications and a scalar that is read, not a second evaluation
     assert 0 < operations(lateral_scale=1.0) - operations() < 12

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.analysis.timing import kernel_operations
+from docs.make.bench.kernels import kernel_operations
 from mitsuba_diffraction.thesis.term_images import thesis_bsdf
 from tests.support.directions import polar, rough_patch
 from tests.support.lanes import evaluated, interaction, vectors

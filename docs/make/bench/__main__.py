@@ -20,14 +20,12 @@ from pathlib import Path
 
 import drjit as dr
 
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.analysis.machine import describe_machine
-from mitsuba_diffraction.cli import Bar, check_outputs
-from mitsuba_diffraction.cli.console import say_warning
-from mitsuba_diffraction.cli.report import save_json
+from mitsuba_diffraction.cli import Bar, check_outputs, save_json
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.progress import Progress
-from mitsuba_diffraction.scene.load import set_variant
+from mitsuba_diffraction.scene import set_variant
 
 from ..figures.pages import (
     from_json,
@@ -146,7 +144,7 @@ def main(args: argparse.Namespace) -> None:
     machine = describe_machine()
     print("; ".join(f"{name} {value}" for name, value in machine.items()), flush=True)
     if machine["load"] > 0.5 * machine["cores"]:
-        say_warning("the machine is busy: trust the ratios, not the times")
+        print("warning: the machine is busy: trust the ratios, not the times", file=sys.stderr)
     measured = []
     with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
         for section in _sections(parts, plan, Path(folder), bar, args.scenes, patch):

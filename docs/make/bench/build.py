@@ -16,12 +16,11 @@ from unittest import mock
 
 import numpy as np
 
+from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.analysis.timing import PIXEL
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights import HeightField, gratings
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.system import peak_memory
-from mitsuba_diffraction.tables import DiffractionTable
 
 from .figures import Goal, Plan, Row, Section
 

@@ -16,13 +16,10 @@ import mitsuba as mi
 import numpy as np
 from mitsuba.python import tensor_io
 
+from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.analysis.timing import PIXEL, Queries, quiet_bsdf
 from mitsuba_diffraction.arrays import Single
-from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.plugin.device_table import device_table
 from mitsuba_diffraction.progress import Progress
-from mitsuba_diffraction.tables.table import DiffractionTable
 from mitsuba_diffraction.thesis.term_images import thesis_bsdf
 
 from .figures import Plan
@@ -119,12 +116,12 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
     }
 
 
-def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]:
+def bare_gathers(bsdf: Any, queries: Queries) -> Callable[[], Any]:
     """All packets that `eval` reads for these queries, added up: the floor beneath any look-up.
 
     Half floats are added up as words, without unpacking. Where they are is found out beforehand.
     """
-    device = device_table(table)
+    table, device = bsdf.table, bsdf.power.device
     packets, nothing = device.read, mi.Float(0.0)
     if device.halves is not None:
         packets, nothing = device.halves.words, mi.Int32(0)

@@ -14,18 +14,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from mitsuba_diffraction.analysis.maps.result import LightDirection
-from mitsuba_diffraction.analysis.timing import (
-    Queries,
-    kernel_operations,
-    kernel_time,
-    ratio,
-    rounds_of,
-    vector_lanes,
-)
+from mitsuba_diffraction.analysis.maps import LightDirection
+from mitsuba_diffraction.analysis.timing import Queries, ratio, rounds_of
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.progress import Progress, silent
-from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables.colour import ColourTable
 
 from .contenders import (
     ALUMINIUM,
@@ -43,6 +36,7 @@ from .contenders import (
     bsdf_factories,
 )
 from .figures import Goal, Plan, Row, Section
+from .kernels import kernel_operations, kernel_time, vector_lanes
 from .scenes import pigment, rays, snake
 
 FLOOR = "bare gathers of the defaults"
@@ -79,7 +73,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         lanes[name] = len(asked.sample1)
         calls[name] = partial(bsdf.eval, context, asked.si, asked.wo)
         if name == DEFAULT:
-            calls[FLOOR] = bare_gathers(bsdf.table, queries[False])
+            calls[FLOOR] = bare_gathers(bsdf, queries[False])
             lanes[FLOOR] = lanes[name]
     timed = time_calls(plan, calls, "eval", progress, lanes)
     times = timed.clock

@@ -13,7 +13,6 @@ from typing import Any
 from mitsuba_diffraction.analysis.timing import rounds_of
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.realtime.glsl import Renderer
-from mitsuba_diffraction.realtime.glsl.context import clock_of
 
 from .contenders import Tables
 from .figures import Goal, Plan, Row, Section
@@ -34,7 +33,7 @@ def measure_frames(plan: Plan, tables: Tables, scenes: Path, progress: Progress)
         stack.callback(renderer.release)
         target = renderer.target(*plan.frame)
         stack.callback(target.release)
-        clock = clock_of(renderer.driver)
+        clock = renderer.clock
         calls: dict[str, Callable[[], Any]] = {}
         for method in _GOALS:
             calls[method] = partial(renderer.draw, target.frame, method)

@@ -15,13 +15,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from mitsuba_diffraction.analysis.timing import KernelTime, kernel_operations, ratio, rounds_of
+from mitsuba_diffraction.analysis.timing import ratio, rounds_of
 from mitsuba_diffraction.progress import Progress
-from mitsuba_diffraction.scene.load import set_variant
+from mitsuba_diffraction.scene import set_variant
 
 from .build import new_process
 from .contenders import Tables
 from .figures import Goal, Plan, Row, Section
+from .kernels import KernelTime, kernel_operations
 from .scenes import pixels_of, skin_of, snake_scene
 
 _COLUMNS = ("ms", "CPU ms", "ns/sample", "× roughconductor", "CPU, × roughconductor", "operations")

@@ -14,7 +14,6 @@ from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.progress import Progress
-from mitsuba_diffraction.tables.store import VARIABLE
 
 from .figures import FULL, Goal, Plan, Row, Section
 
@@ -66,9 +65,8 @@ def _timed(files: list[str], folder: Path, options: list[str]) -> tuple[float, f
         "--pixel-size", str(_SIDE / _PIXELS), "-o", str(folder / "survey"), *options,
     ]  # fmt: skip
     start, before = time.perf_counter(), os.times()
-    ran = subprocess.run(
-        command, env={**os.environ, VARIABLE: str(folder / "cache")}, capture_output=True, text=True
-    )
+    cache = {"MITSUBA_DIFFRACTION_CACHE": str(folder / "cache")}
+    ran = subprocess.run(command, env=os.environ | cache, capture_output=True, text=True)
     if ran.returncode:
         said = ran.stderr.strip().splitlines() or [f"exit code {ran.returncode}"]
         raise DiffractionError(f"the survey failed: {said[-1]}")

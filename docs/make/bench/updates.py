@@ -13,10 +13,9 @@ import drjit as dr
 import mitsuba as mi
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction import gratings
 from mitsuba_diffraction.analysis.timing import PIXEL
-from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.progress import Progress
-from mitsuba_diffraction.tables.store import VARIABLE
 
 from .figures import Goal, Row, Section
 
@@ -47,7 +46,7 @@ CASES = (
 def measure_updates(folder: Path, progress: Progress) -> Section:
     """Update each case's parameter, of which derivatives are taken, with an empty cache."""
     rows = []
-    with mock.patch.dict(os.environ, {VARIABLE: str(folder / "updates")}):
+    with mock.patch.dict(os.environ, {"MITSUBA_DIFFRACTION_CACHE": str(folder / "updates")}):
         for n, case in enumerate(CASES):
             progress(n, len(CASES), case.name)
             rows.append(_measured(case))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction.arrays import Real, Single
 from mitsuba_diffraction.optics.colour import delta_e
-from mitsuba_diffraction.scene.pictures import read_exr
+from mitsuba_diffraction.scene import read_exr
 
 from .program import Seconds, run_in_blender, seconds
 from .views import View

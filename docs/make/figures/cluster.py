@@ -19,12 +19,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction.cluster.frames import FrameRequest, FrameSequence
-from mitsuba_diffraction.cluster.workers import connect
+from mitsuba_diffraction.cluster import FrameRequest, FrameSequence, connect
 from mitsuba_diffraction.errors import warn
 from mitsuba_diffraction.progress import silent
-from mitsuba_diffraction.scene.load import load_scene, set_variant
-from mitsuba_diffraction.scene.passes import Stop, render_passes
+from mitsuba_diffraction.scene import Stop, load_scene, render_passes, set_variant
 
 from . import pages
 from .pages import option, program

@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
 from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
 from mitsuba_diffraction.thesis.period_fit import (
@@ -21,13 +21,13 @@ from mitsuba_diffraction.thesis.period_fit import (
     Fit,
     Response,
     Ridge,
+    draw,
     fit_period,
     measure,
     ridge_of,
     thesis_fit,
     window_fits,
 )
-from mitsuba_diffraction.thesis.period_fit.plot import draw
 
 from . import pages
 

@@ -14,9 +14,10 @@ from pathlib import Path
 from types import ModuleType
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli import build_parser
+from mitsuba_diffraction.heights import LoadOptions
 from mitsuba_diffraction.heights.formats.catalogue import sections
-from mitsuba_diffraction.heights.read import OPTIONS
+from mitsuba_diffraction.settings import parameters_of
 
 from . import pages, parameters
 from .pages import option, program
@@ -59,7 +60,7 @@ def commands_page() -> str:
             f"`--{name.replace('_', '-')} {each.metavar}`",
             each.help.replace("|", r"\|").replace("%%", "%"),
         )
-        for name, each in OPTIONS.items()
+        for name, each in parameters_of(LoadOptions).items()
     ]
     sections += [
         "## Options for reading heights",

@@ -22,8 +22,7 @@ from docs.make.blender.compare import blocks
 from mitsuba_diffraction.arrays import Real, Single
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import natural
-from mitsuba_diffraction.scene.load import load_scene, set_variant
-from mitsuba_diffraction.scene.pictures import read_exr
+from mitsuba_diffraction.scene import load_scene, read_exr, set_variant
 
 from . import pages
 from .pages import option, program, write_jpeg

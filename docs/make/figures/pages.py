@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from PIL import Image
 
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.cli import main as command
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights.field import HeightField
 
 if TYPE_CHECKING:  # Matplotlib would be a part of what the bench measures
     from matplotlib.figure import Figure

@@ -9,29 +9,18 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from matplotlib.figure import Figure
 
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.analysis.maps import LightDirection, brdf_map, draw
-from mitsuba_diffraction.analysis.maps.picture import signed
 from mitsuba_diffraction.analysis.pictures import patches_figure
-from mitsuba_diffraction.errors import DiffractionWarning
-from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.analysis.timing import quiet_bsdf
 from mitsuba_diffraction.heights.gratings import blazed, cd, dvd, elaphe_like, xenopeltis_like
 
-from .pages import (
-    measured_options,
-    measured_patch,
-    option,
-    program,
-    run,
-    write_figure,
-    write_jpeg,
-)
+from .pages import measured_options, measured_patch, option, program, run, write_figure, write_jpeg
 
 LOOKALIKES = (elaphe_like, xenopeltis_like, cd, dvd)
 LIGHTS = (LightDirection(0.0), LightDirection(45.0, 180.0))
@@ -57,7 +46,8 @@ def maps_figure(
     figure = Figure(figsize=((side + 0.25) * columns + 0.45, (side + 0.45) * rows + 0.45))
     width, height = figure.get_size_inches()
     for column, field in enumerate(fields):
-        bsdf = _perfect_reflector(field)
+        # periodic gratings are given by one period, and steep look-alikes are what is wanted
+        bsdf = quiet_bsdf(field, material="none")
         for row, light in enumerate(lights):
             left = 0.55 + (side + 0.25) * column
             bottom = 0.5 + (side + 0.45) * (rows - 1 - row)
@@ -66,24 +56,14 @@ def maps_figure(
             result = brdf_map(bsdf, light.theta, light.phi, resolution=resolution, step=step)
             stops = result.exposure()
             draw(axes, result, stops)
+            shown = f"{stops:+g}".replace("-", "−")
             axes.tick_params(labelsize=7, labelbottom=row == rows - 1, labelleft=column == 0)
-            axes.set_title(f"{field.name}, {light}; {signed(stops)} stops", fontsize=8)
+            axes.set_title(f"{field.name}, {light}; {shown} stops", fontsize=8)
             if row == rows - 1:
                 axes.set_xlabel("x = sin θₒ cos φₒ", fontsize=8)
             if column == 0:
                 axes.set_ylabel("y = sin θₒ sin φₒ", fontsize=8, labelpad=0)
     return figure
-
-
-def _perfect_reflector(field: HeightField) -> Any:
-    import mitsuba as mi
-
-    from mitsuba_diffraction.plugin.dictionary import bsdf_dict
-
-    with warnings.catch_warnings():
-        # periodic gratings are given by one period, and steep look-alikes are what is wanted
-        warnings.simplefilter("ignore", DiffractionWarning)
-        return mi.load_dict(bsdf_dict(field, material="none"))
 
 
 def _patches(args: argparse.Namespace) -> None:
@@ -94,7 +74,7 @@ def _patches(args: argparse.Namespace) -> None:
 
 def _maps(args: argparse.Namespace) -> None:
     """Draw maps of a measured patch, look-alikes of two snakes, a CD and a blazed grating."""
-    from mitsuba_diffraction.scene.load import set_variant
+    from mitsuba_diffraction.scene import set_variant
 
     fields = [*_measured(args), elaphe_like(), xenopeltis_like(), cd(), blazed(2.5, 0.25)]
     set_variant(None)

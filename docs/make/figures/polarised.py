@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction import OrderTable
 
 from . import pages
 from .pages import option, program, write_jpeg

@@ -11,9 +11,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw
 
-from mitsuba_diffraction.plugin.presets import presets
-
-from .pages import option, program, run, write_jpeg
+from .pages import from_json, option, program, run, write_jpeg
 
 PICTURE = Path("images", "presets.jpg")
 _MESH = Path("scenes", "meshes", "knot.ply")
@@ -24,7 +22,11 @@ _MOST = 160_000  # bytes of the picture
 def draw(folder: Path, samples: int) -> Path:
     """Render a mesh of each preset in the studio of meshes; return the picture of all."""
     width, height = _SIZE
-    names = list(presets())
+    run("presets", "--json", folder / "presets.json")
+    names = from_json(
+        folder / "presets.json", lambda listed: [each["name"] for each in listed["presets"]],
+        writer="presets", remedy="update the package",
+    )  # fmt: skip
     rows = -(-len(names) // _COLUMNS)
     sheet = Image.new("RGB", (_COLUMNS * width, rows * (height + _LABEL)), "white")
     pen = ImageDraw.Draw(sheet)

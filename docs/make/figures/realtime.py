@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mitsuba_diffraction.realtime.shader_comparison.report import plain_number
+from mitsuba_diffraction.realtime.shader_comparison import plain_number
 
 from . import pages
 from .pages import from_json, option, program, write_jpeg

@@ -16,11 +16,8 @@ from docs.make.validation.compare import misplaced
 from docs.make.validation.light import heights_of, light_on
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import sigma_of
-from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders import solve
 from mitsuba_diffraction.orders.solve.profiles import Profile, sinusoidal
-from mitsuba_diffraction.orders.solve.sheet import sheet_efficiencies
-from mitsuba_diffraction.orders.solve.stations import Grating
 
 from . import pages
 from .pages import option, program
@@ -60,10 +57,10 @@ def row(case: Case) -> tuple[str, ...]:
 def _missed(case: Case, theta: float, phi: float, wavelength: float) -> float:
     """Return Σ|model − solution| over Σ solution, of the transmitted orders but 0."""
     wi, period = direction(theta, phi), case.profile.period
-    grating = Grating(case.profile, material_of(_INDEX, _RANGE), 1.0, _RANGE, thin=True)
+    grating = solve.Grating(case.profile, solve.material_of(_INDEX, _RANGE), 1.0, _RANGE, thin=True)
     station, channel = light_on(grating, -wi[0], -wi[1], wavelength)
-    amplitudes = IntegralSolver(case.profile, case.points).amplitudes(station)
-    powers = sheet_efficiencies(amplitudes, station)[0, channel]
+    amplitudes = solve.IntegralSolver(case.profile, case.points).amplitudes(station)
+    powers = solve.sheet_efficiencies(amplitudes, station)[0, channel]
     solved = powers[:, station.channels :].mean(axis=0).sum(axis=-1)
     orders = channel - np.arange(station.channels)
     x = orders * wavelength / (1e3 * period) - wi[0]

@@ -19,13 +19,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from mitsuba_diffraction.analysis.maps.picture import contact_sheet
-from mitsuba_diffraction.analysis.maps.result import LightDirection
+from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.analysis.maps import LightDirection, contact_sheet
 from mitsuba_diffraction.errors import DiffractionWarning
-from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
-from mitsuba_diffraction.thesis.methods import NAMES, OrdersOnly, make, make_all
-from mitsuba_diffraction.thesis.methods.make import method_map
+from mitsuba_diffraction.thesis.methods import NAMES, OrdersOnly, make, make_all, method_map
 from mitsuba_diffraction.thesis.sweeps import (
     SWEEPS,
     Compiled,
@@ -140,7 +138,7 @@ def numbers(result: Sweep) -> str:
 
 def write_methods(args: argparse.Namespace, scale: HeightField | None) -> None:
     """Measure, and write the table."""
-    from mitsuba_diffraction.scene.load import set_variant
+    from mitsuba_diffraction.scene import set_variant
 
     set_variant(None)
     scale = scale or (elaphe_like(8.0, 128) if args.small else elaphe_like())

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.ndimage import zoom
 
 from mitsuba_diffraction import DiffractionTable, gratings
-from mitsuba_diffraction.tables.build.spectrum import GLOSSY_RADIUS
+from mitsuba_diffraction.tables import GLOSSY_RADIUS
 
 from . import pages
 from .pages import option, program

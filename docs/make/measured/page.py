@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from docs.make.validation.pages.markdown import table
 from mitsuba_diffraction.arrays import Real
-from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve import CoupledWaves, IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile
 
 from . import cases, outside, predict, shapes

@@ -13,11 +13,8 @@ from docs.make.validation.model import modelled
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.orders.solve.chandezon import Chandezon
-from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve import Chandezon, IntegralSolver, Solver, Station, material_of
 from mitsuba_diffraction.orders.solve.profiles import Profile
-from mitsuba_diffraction.orders.solve.stations import Solver, Station
 
 # y of light in the plane across the grooves; at 0 exactly the two polarisations are the same
 _ALONG = 0.0

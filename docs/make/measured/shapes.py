@@ -10,7 +10,7 @@ import numpy as np
 from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.fresnel import Filmed, normal_reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve import IntegralSolver
 
 from . import predict
 from .cases import GLASS

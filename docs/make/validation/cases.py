@@ -16,10 +16,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mitsuba_diffraction import HeightField, gratings
 from mitsuba_diffraction.arrays import Real, Whole
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.heights.field import HeightField
 
 #: Folder of the stored solutions.
 DATA = Path(__file__).parent / "data"

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import jv
 
-from mitsuba_diffraction import HeightField, reference
+from mitsuba_diffraction import DiffractionTable, HeightField, reference
 from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, kirchhoff_factor, wavenumber
-from mitsuba_diffraction.tables.lookup import window_sum
-from mitsuba_diffraction.tables.table import DiffractionTable
 
 from .cases import WAVELENGTHS, Grating, in_plane, order_sines
 from .model import LOBE_SIGMA
@@ -82,7 +80,7 @@ def deviations(grating: Grating, pixels: int = 512) -> Deviations:
             scale = kirchhoff_factor(wi, wo, wavelength, LOBE_SIGMA) * unit
             width = WIDTHS_PER_SIGMA * LOBE_SIGMA
             peaks = reference.brdf(strip, wi, wo, wavelength, coherence_width=width) / scale
-            looked_up = window_sum(table, 2 * np.pi * orders / grating.period, 0.0, kappa)
+            looked_up = table.window_sum(2 * np.pi * orders / grating.period, 0.0, kappa)
             worst_integral = max(worst_integral, float(np.max(np.abs(peaks - exact))))
             worst_table = max(worst_table, float(np.max(np.abs(looked_up - exact))))
             count += len(orders)

@@ -9,8 +9,8 @@ import numpy as np
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.orders import cells
+from mitsuba_diffraction.orders.solve import Grating, Solver, Station
 from mitsuba_diffraction.orders.solve.profiles import Profile
-from mitsuba_diffraction.orders.solve.stations import Grating, Solver, Station
 
 from .cases import PIXELS, Case
 from .solutions import Orders

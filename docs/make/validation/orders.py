@@ -17,12 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mitsuba_diffraction import OrderTable
-from mitsuba_diffraction.orders.solve.chandezon import Chandezon
-from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
-from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
-from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
-from mitsuba_diffraction.orders.solve.stations import Grating, Solver
+from mitsuba_diffraction.orders import solve
 
 from .cases import Case, Light, Media, Sampled
 from .compare import Comparison, compare
@@ -89,9 +84,9 @@ class Shipped:
     name: str
 
     @cached_property
-    def recipe(self) -> SolvedRecipe:
+    def recipe(self) -> solve.SolvedRecipe:
         """Recipe of the table."""
-        return SolvedRecipe.load(FOLDER / f"{self.name}.toml")
+        return solve.SolvedRecipe.load(FOLDER / f"{self.name}.toml")
 
     @cached_property
     def table(self) -> OrderTable:
@@ -163,7 +158,7 @@ class Shipped:
         lam = rng.uniform(*table.wavelengths, samples)
         resolution = self.recipe.settings.resolution
         assert resolution is not None
-        solver = IntegralSolver(self.recipe.profile, resolution)
+        solver = solve.IntegralSolver(self.recipe.profile, resolution)
         absorbed, deviation, missed, colours = np.zeros((4, samples))
         for n in range(samples):
             by_order = self._by_solver(solver, x[n], y[n], lam[n])
@@ -183,24 +178,24 @@ class Shipped:
             float(size.max()),
         )
 
-    def _by_solver(self, solver: Solver, x: float, y: float, lam: float) -> dict[int, float]:
+    def _by_solver(self, solver: solve.Solver, x: float, y: float, lam: float) -> dict[int, float]:
         """Return the efficiencies of all orders by the table's solver."""
         recipe, alone = self.recipe, (lam, lam)
-        material = material_of(recipe.material, alone)
-        grating = Grating(recipe.profile, material, recipe.superstrate, alone)
+        material = solve.material_of(recipe.material, alone)
+        grating = solve.Grating(recipe.profile, material, recipe.superstrate, alone)
         powers = powers_of(solver, light_on(grating, x, y, lam))
         return {m: float(power.mean()) for m, power in powers.items()}
 
     def _index(self, wavelength: float) -> complex:
         """Return the index over that of the superstrate."""
         recipe = self.recipe
-        index = material_of(recipe.material, recipe.settings.wavelengths).index(wavelength)
+        index = solve.material_of(recipe.material, recipe.settings.wavelengths).index(wavelength)
         assert index is not None
         return complex(index) / recipe.superstrate
 
     @cached_property
-    def solver(self) -> Solver:
+    def solver(self) -> solve.Solver:
         """The solver beside."""
         if self.name in ("cd", "dvd"):
-            return CoupledWaves(self.recipe.profile, COUPLED)
-        return Chandezon(self.recipe.profile, CHANDEZON)
+            return solve.CoupledWaves(self.recipe.profile, COUPLED)
+        return solve.Chandezon(self.recipe.profile, CHANDEZON)

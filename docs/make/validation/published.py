@@ -7,11 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction.orders.solve.chandezon import Chandezon
-from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve import Chandezon, CoupledWaves, IntegralSolver, Solver
 from mitsuba_diffraction.orders.solve.profiles import Profile, lamellar, sinusoidal
-from mitsuba_diffraction.orders.solve.stations import Solver
 
 from .light import Beam, light_of, powers_of
 

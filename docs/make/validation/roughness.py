@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import gammaln
 
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.arrays import Real
-from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.optics.geometry import (
     diffraction_coordinates,
     kirchhoff_factor,

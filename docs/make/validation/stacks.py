@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+import warnings
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.optics.coat import face_transmittance
-from mitsuba_diffraction.orders.solve.crossed import CrossedWaves
-from mitsuba_diffraction.orders.solve.films import structure_of
-from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
-from mitsuba_diffraction.orders.solve.jobs import AUTO, problem_of, solver_of
-from mitsuba_diffraction.orders.solve.orders import solve_orders
+from mitsuba_diffraction import DiffractionWarning, HeightField, solve_orders
+from mitsuba_diffraction.orders import solve
 from mitsuba_diffraction.orders.solve.profiles import Profile, UnitCell, lamellar, sinusoidal
-from mitsuba_diffraction.orders.solve.settings import Settings
-from mitsuba_diffraction.orders.solve.stations import CrossedStation, Grating
+from mitsuba_diffraction.reference import fresnel
 
 from . import crossed
 from .cases import Case, Light, Media, Sampled
-from .light import light_on, powers_of
 from .solutions import imported
 
 # Wavelengths of the structures, nm
@@ -49,25 +42,22 @@ class Compared(NamedTuple):
     beside: str
 
 
-def stacked(
-    profile: Profile, material: str = "1.46", superstrate: float = 1.0, **media: object
-) -> Grating:
-    """Return a grating with films and layers; media are arguments of `structure_of`."""
-    substance = material_of(material, _RANGE)
-    structure = structure_of(profile, substance, _RANGE, **media)  # type: ignore[arg-type]
-    return Grating(profile, substance, superstrate, _RANGE, structure=structure)
-
-
 def efficiencies(
-    grating: Grating, harmonics: int, theta: float, wavelength: float
-) -> dict[int, np.ndarray]:
-    """Return efficiencies (2,) of s and p light by order, of light across the grooves.
+    profile: Profile, harmonics: int, theta: float, wavelength: float, *, material: str = "1.46",
+    **media: Any,
+) -> dict[int, np.ndarray]:  # fmt: skip
+    """Return efficiencies (2,) of s and p light by order, −1 to 1, of light across the grooves.
 
     harmonics : of the solver that the package chooses.
     theta, wavelength : of the light, degrees and nm.
+    media : more arguments of `solve_orders`.
     """
-    solver = solver_of(problem_of(grating, AUTO, harmonics))
-    return powers_of(solver, light_on(grating, -np.sin(np.radians(theta)), 0.0, wavelength))
+    settings = solve.Settings((wavelength, wavelength), resolution=harmonics)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)  # the table has no other light
+        table = solve_orders(profile, material, theta=theta, settings=settings, **media)
+    light = -np.sin(np.radians(theta)), 0.0, wavelength
+    return {m: table.polarised_efficiency(*light, m) for m in (-1, 0, 1)}
 
 
 def by_ikarus(theta: float, wavelength: float) -> dict[int, np.ndarray]:
@@ -115,15 +105,15 @@ def _closed_forms() -> Iterator[Compared]:
     low, high, pairs, lam = 1.46, 2.35, 5, 550.0
     thick = [(str(index), 1e-3 * lam / 4 / index) for index in (low, high)]
     beneath = [thick[1], *(thick * pairs)]
-    surface = stacked(lamellar(0.5, 0.0), "1.52", beneath=beneath)
+    flat = efficiencies(lamellar(0.5, 0.0), 3, 1e-3, lam, material="1.52", beneath=beneath)
     yield Compared(
         "11 layers of a quarter wavelength on glass", f"0°, {lam:g} nm",
-        float(efficiencies(surface, 2, 1e-3, lam)[0].mean()),
+        float(flat[0].mean()),
         quarter_wave_reflectance(low, high, 1.52, pairs), "closed form",
     )  # fmt: skip
     index = 1.5
-    flat = Settings((500.0, 560.0), tolerance=0.1, resolution=4)
-    block = solve_orders(lamellar(0.4, 1e-7), index, block=True, settings=flat)
+    settings = solve.Settings((500.0, 560.0), tolerance=0.1, resolution=4)
+    block = solve_orders(lamellar(0.4, 1e-7), index, block=True, settings=settings)
     for theta, from_within in ((30.0, False), (80.0, False), (30.0, True), (41.0, True)):
         x = np.sin(np.radians(theta)) * (index if from_within else 1.0)
         cosine = float(np.sqrt(1.0 - x * x))
@@ -131,26 +121,27 @@ def _closed_forms() -> Iterator[Compared]:
         side = "within" if from_within else "above"
         yield Compared(
             "a block's flat face, transmitted", f"{theta:g}° from {side}", float(found),
-            float(face_transmittance(cosine, index)), "Fresnel",
+            1.0 - float(fresnel.reflectance(cosine, index)), "Fresnel",
         )  # fmt: skip
 
 
 def _transfer_matrices() -> Iterator[Compared]:
     tmm = imported("tmm")
     lam, metal = 540.0, {"layers": [("1.38", 0.12)], "beneath": MIRROR, "substrate": "Al"}
-    films: Sequence[tuple[str, float]] = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
+    films = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
+    sloped = {"material": "Al", "layers": films}
     flat = {
-        "a film, a mirror of 6 layers, aluminium": stacked(lamellar(0.5, 0.0), **metal),
-        "three films on aluminium, slopes": stacked(sinusoidal(0.5, 1e-9), "Al", layers=films),
+        "a film, a mirror of 6 layers, aluminium": (lamellar(0.5, 0.0), metal),
+        "three films on aluminium, slopes": (sinusoidal(0.5, 1e-9), sloped),
     }
-    aluminium = complex(material_of("Al", _RANGE).index(lam)[()])
+    aluminium = complex(solve.material_of("Al", _RANGE).index(lam)[()])
     stacks = (
         ([1.0, 1.38, *(1.95, 1.46) * 3, aluminium], [120.0, *(75.0, 100.0) * 3]),
         ([1.0, 1.38, 2.3 + 0.01j, 1.46, aluminium], [120.0, 60.0, 80.0]),
     )
-    for (case, surface), (indices, depths) in zip(flat.items(), stacks, strict=True):
+    for (case, (profile, media)), (indices, depths) in zip(flat.items(), stacks, strict=True):
         for theta in (10.0, 50.0):
-            got = efficiencies(surface, 3, theta, lam)[0]
+            got = efficiencies(profile, 3, theta, lam, **media)[0]
             for name, found in zip("sp", got, strict=True):
                 stack = (name, indices, [np.inf, *depths, np.inf], np.radians(theta), lam)
                 light = f"{theta:g}°, {lam:g} nm, {name}"
@@ -159,8 +150,8 @@ def _transfer_matrices() -> Iterator[Compared]:
 
 def _ridges() -> Iterator[Compared]:
     theta, lam = 45.0, 532.0
-    surface = stacked(lamellar(*RIDGES), beneath=BENEATH)
-    ours, theirs = efficiencies(surface, _HARMONICS, theta, lam), by_ikarus(theta, lam)
+    ours = efficiencies(lamellar(*RIDGES), _HARMONICS, theta, lam, beneath=BENEATH)
+    theirs = by_ikarus(theta, lam)
     for order in (1, 0):
         for light, name in enumerate("sp"):
             found, truth = float(ours[order][light]), float(theirs[order][light])
@@ -175,12 +166,13 @@ def _ridges() -> Iterator[Compared]:
 def _sine() -> Iterator[Compared]:
     profile, index, limits = sinusoidal(0.4, 0.05), 1.5, (500.0, 560.0)
     table = solve_orders(
-        profile, index, settings=Settings(limits, tolerance=0.02, resolution=8), block=True
+        profile, index, settings=solve.Settings(limits, tolerance=0.02, resolution=8), block=True
     )
     # the block below, as a thin sheet's upper side, with channels of the light above
-    side = Grating(profile, material_of(index, limits), 1.0, limits, thin=True)
+    side = solve.Grating(profile, solve.material_of(index, limits), 1.0, limits, thin=True)
     station = side.station(1, 0, 0.3, 0.4, [0.3])
-    powers = 0.5 * (np.abs(IntegralSolver(profile, 50).amplitudes(station)[0]) ** 2).sum((1, 3))
+    amplitudes = solve.IntegralSolver(profile, 50).amplitudes(station)[0]
+    powers = 0.5 * (np.abs(amplitudes) ** 2).sum((1, 3))
     n, y, lam = station.channels, station.along[0], 1e3 * station.wavelengths[0]
     numbers = np.concatenate([np.arange(n), station.inside])
     x = np.sqrt(1.0 - y * y) * station.sines_of(numbers)
@@ -209,8 +201,8 @@ def _crossed() -> Iterator[Compared]:
     field = HeightField(0.1 * (lumps + 0.1 * np.sin(x + 2.0 * y)), 0.5 / pixels)
     case = Case(Sampled(field), Light(lam, theta, phi), Media(1.5))
     x, y = -case.wi[:2]
-    station = CrossedStation(x, y, 1e-3 * lam, case.index, field.extent)
-    solver = CrossedWaves(UnitCell(field.heights, field.extent), 5)
+    station = solve.CrossedStation(x, y, 1e-3 * lam, case.index, field.extent)
+    solver = solve.CrossedWaves(UnitCell(field.heights, field.extent), 5)
     orders = station.orders.tolist()
     amplitudes = solver.amplitudes(station)[0, orders.index([0, 0])]
     found = (np.abs(amplitudes) ** 2).sum(axis=-1).mean(axis=0)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mitsuba_diffraction import reference
+from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.arrays import Real
-from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.spectra import order_powers
+from mitsuba_diffraction.heights import order_powers
 from mitsuba_diffraction.optics.geometry import wavenumber
 
 from .cases import in_plane

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+__all__ = ["RawHeights", "catalogue", "first_line"]
+
 
 @dataclass
 class RawHeights:

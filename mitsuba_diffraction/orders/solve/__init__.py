@@ -21,3 +21,19 @@ sheet       the sum of reflections in a thin sheet with a flat lower side
 jobs        stations solved in processes, and stored until the table is written
 recipes     recipes with `method = "solved"`
 """
+
+from .chandezon import Chandezon
+from .coupled import CoupledWaves
+from .crossed import CrossedWaves
+from .grating_index import material_of
+from .integral import IntegralSolver
+from .recipes import SolvedRecipe
+from .settings import Settings
+from .sheet import sheet_efficiencies
+from .stations import CrossedStation, Grating, Solver, Station
+
+__all__ = [
+    "Chandezon", "CoupledWaves", "CrossedStation", "CrossedWaves", "Grating", "IntegralSolver",
+    "Settings", "SolvedRecipe", "Solver", "Station", "jobs", "material_of",
+    "profiles", "sheet_efficiencies",
+]  # fmt: skip

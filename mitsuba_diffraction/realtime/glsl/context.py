@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...extras import optional
-from ...system import cores
 from .scene import VERTEX
 from .source import fragment_parts, plain_source, vertex_source
 from .texels import PAGE, Packed, Texture, Uniform, distinct_rows
@@ -21,7 +19,6 @@ from .texels import PAGE, Packed, Texture, Uniform, distinct_rows
 #: Required version of OpenGL, 3.3.
 REQUIRED = 330
 
-_SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
 _INSTALL = "apt install libegl1 libgl1 libgl1-mesa-dri"
 
 
@@ -66,18 +63,6 @@ def check_version(context: Any) -> None:
             f"most, but the shaders need {PAGE}; use Mesa's software rasteriser: "
             "LIBGL_ALWAYS_SOFTWARE=1"
         )
-
-
-def clock_of(driver: str) -> Callable[[], float]:
-    """Return the clock to time a driver's pictures with, in seconds.
-
-    The clock of a software rasteriser is the process time divided by the number of cores: like on a
-    graphics card, other programs do not count.
-    """
-    if not _SOFTWARE.search(driver):
-        return time.perf_counter
-    number = cores()
-    return lambda: time.process_time() / number
 
 
 def compile_program(

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import warn
+from ...system import cores
 from .camera import Camera
 from .context import (
     Bindings,
@@ -31,6 +34,7 @@ from .source import LIGHTS
 from .texels import Packed, Uniform
 
 Image = NDArray[np.float32]
+_SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
 
 
 class Renderer:
@@ -82,6 +86,18 @@ class Renderer:
     def driver(self) -> str:
         """Name of the OpenGL driver."""
         return str(self.context.info["GL_RENDERER"])
+
+    @property
+    def clock(self) -> Callable[[], float]:
+        """Clock to time the driver's pictures with, in seconds.
+
+        The clock of a software rasteriser is the process time divided by the number of cores: like
+        on a graphics card, other programs do not count.
+        """
+        if not _SOFTWARE.search(self.driver):
+            return time.perf_counter
+        number = cores()
+        return lambda: time.process_time() / number
 
     def render(
         self, method: str = "fast", *, supersampling: int = 4, size: tuple[int, int] | None = None

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .context import VertexBuffer, clock_of, compile_program, set_uniforms
+from .context import VertexBuffer, compile_program, set_uniforms
 from .renderer import Renderer
 from .source import LIGHTS
 from .texels import Uniform
@@ -27,7 +27,7 @@ def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, floa
     The fragments belong to a plane with the first diffracting surface's material, which fills the
     picture under one directional light: all of the fragment stage, with next to no geometry.
     Methods alternate in rounds, and the fastest time of each counts, so that background load
-    affects all equally. The clock is `context.clock_of`.
+    affects all equally. The clock is `Renderer.clock`.
     """
     timed = {method: _triangle(renderer, method) for method in methods}
     seconds = dict.fromkeys(methods, np.inf)
@@ -51,7 +51,7 @@ def _seconds(renderer: Renderer, array: Any, bind: Callable[[], object]) -> floa
     array.render()
     renderer.context.finish()
     target.frame.viewport = (0, 0, SIDE, SIDE)
-    clock = clock_of(renderer.driver)
+    clock = renderer.clock
     times = 1
     while True:
         start = clock()

@@ -14,7 +14,6 @@ from ...errors import DiffractionError, warn
 from ...progress import Progress, silent
 from ...scene.passes import Stop, render_passes
 from ...scene.pictures import write_exr
-from ..glsl.context import clock_of
 from ..glsl.renderer import Renderer
 from ..glsl.timing import fragment_times
 from .measures import dark_region, difference, exposure_of
@@ -190,7 +189,7 @@ class Comparison:
         side = min(self.supersampling, math.isqrt(max(_IN_FRAME // (width * height), 1)))
         size = side * width, side * height
         light = renderer.progressive(method, size=size, bounces=bounces)
-        clock = clock_of(renderer.driver)
+        clock = renderer.clock
         light.advance(2)  # compiles
         light.restart()
         halves, start = [], clock()

@@ -15,18 +15,10 @@ from __future__ import annotations
 from .directions import DirectionField, direction_field
 from .mesh_files import MeshFile, load_mesh, load_orientation, read_mesh, write_ply
 from .tangents import TangentReport, check_tangents
-from .trimesh import TriangleMesh, oriented_mesh
+from .trimesh import TriangleMesh, cell_corners, grid_faces, oriented_mesh
 
 __all__ = [
-    "DirectionField",
-    "MeshFile",
-    "TangentReport",
-    "TriangleMesh",
-    "check_tangents",
-    "direction_field",
-    "load_mesh",
-    "load_orientation",
-    "oriented_mesh",
-    "read_mesh",
-    "write_ply",
-]
+    "DirectionField", "MeshFile", "TangentReport", "TriangleMesh", "cell_corners",
+    "check_tangents", "direction_field", "grid_faces", "load_mesh", "load_orientation",
+    "oriented_mesh", "read_mesh", "write_ply",
+]  # fmt: skip

@@ -110,19 +110,6 @@ def _shared(normals: Real, places: Whole) -> Real:
     return total
 
 
-def join(meshes: list[TriangleMesh]) -> TriangleMesh:
-    """Join meshes into one, without welding; an orientation is kept where all have one."""
-    starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
-    turns = [mesh.orientation for mesh in meshes if mesh.orientation is not None]
-    return TriangleMesh(
-        np.concatenate([mesh.positions for mesh in meshes]),
-        np.concatenate([mesh.normals for mesh in meshes]),
-        np.concatenate([mesh.uv for mesh in meshes]),
-        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]),
-        np.concatenate(turns) if len(turns) == len(meshes) else None,
-    )
-
-
 class TextureTangents(NamedTuple):
     """Tangents of triangles by their texture coordinates.
 

@@ -6,3 +6,7 @@ table       `ColourTable`; how much colours change from one to another
 build       how it is summed, on a polar grid
 proposals   densities to draw directions from, by brightness
 """
+
+from .table import ColourTable
+
+__all__ = ["ColourTable"]

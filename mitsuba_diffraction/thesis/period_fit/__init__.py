@@ -11,12 +11,14 @@ FEWEST          maxima that a fit needs at least
 Fit             period of the grating equation that fits a ridge
 fit_period      fit of that period
 find_period     period of the strongest ridge that obeys the grating equation, if one does
+draw            draw a response and its ridge into Matplotlib axes
 window_fits     fits to single coherence windows spread over the patch
 thesis_fit      procedure behind the thesis' published periods
 """
 
 from __future__ import annotations
 
+from .plot import draw
 from .ridge import (
     FEWEST,
     Beam,
@@ -31,6 +33,6 @@ from .ridge import (
 from .windows import thesis_fit, window_fits
 
 __all__ = [
-    "FEWEST", "Beam", "Fit", "Response", "Ridge", "find_period", "fit_period", "measure",
+    "FEWEST", "Beam", "Fit", "Response", "Ridge", "draw", "find_period", "fit_period", "measure",
     "ridge_of", "thesis_fit", "window_fits",
 ]  # fmt: skip

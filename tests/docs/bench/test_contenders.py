@@ -65,7 +65,7 @@ def test_bare_gathers_read_what_a_look_up_reads(factories, queries):
                 bits = halves.reshape(len(halves), 2, -1).view(np.uint16).astype(np.uint32)
                 words = bits[:, 0] | (bits[:, 1] << 16)
                 expected += words.sum(axis=1, dtype=np.uint32).view(np.int32)
-    gathered = np.array(bare_gathers(table, queries)())
+    gathered = np.array(bare_gathers(bsdf, queries)())
     # in single precision a few of the 4 × 500 look-ups fall into the neighbouring bin
     assert (gathered != expected).mean() < 0.01
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 
 from ..compare import GRAZING, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT

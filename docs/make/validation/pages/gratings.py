@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 
 from .. import goals, models
 from ..cases import Grating

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 
 from ..cases import PROFILES, Case, Grating
 from ..compare import Comparison, angles_of, gratings_of, table_of

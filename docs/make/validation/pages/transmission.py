@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
-from mitsuba_diffraction.analysis.energy import PASSED
-
 from .. import transmitted
 from ..compare import GRAZING
 from .markdown import angle, beside, percent, table
@@ -55,13 +53,14 @@ At slopes up to 0.1 `small_slope` is within {percent(normal)} in light along the
 
 
 def _surfaces(measured: Measurements) -> str:
+    sums = list(transmitted.sums_of_surfaces(list(transmitted.SURFACES)[: measured.most(1)]))
     rows = [
         [
             one.surface,
             f"{one.medium}, {one.side}",
             *(f"{_span(one.model[at])} → {_span(one.conserved[at])}" for at in one.model),
         ]
-        for one in transmitted.sums_of_surfaces(list(transmitted.SURFACES)[: measured.most(1)])
+        for one in sums
     ]
     return f"""## Reflected and transmitted light
 
@@ -69,7 +68,7 @@ A lossless dielectric has R + T = 1. Least and largest R + T of 24 azimuths at 4
 for the index {transmitted.INDEX:g} and a coherence width of 20 µm, as `info --energy` prints them:
 model → `energy_conserving`, the default.
 
-{table(["surface", "light", *map(angle, PASSED)], rows)}
+{table(["surface", "light", *sums[0].model], rows)}
 
 Missing light is shared by all orders."""
 
