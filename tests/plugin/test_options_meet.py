@@ -32,7 +32,7 @@ SHARES = {"type": "bitmap", "raw": True}
 ENDS = {"film_thickness": SHARES, "film_thickness_min": 100.0, "film_thickness_max": 700.0}
 SURFACE = {"coherence": "surface", "uv_scale": 10.0}
 MEETING = {
-    **{kind: MORE[kind] for kind in ("less dense", "film on a dielectric", "coat, narrower")},
+    "film on a dielectric": MORE["film on a dielectric"],
     "film of a texture, tangent plane, lower": Kind(
         FILMED[0] | ENDS | PLANE | {"height_scale": 0.5}, FILMED[1] | PLANE, height=0.5
     ),
