@@ -6,6 +6,7 @@ The thorough tests ask more of each: test_kinds_thorough.py, test_polarised.py, 
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 from typing import Any
 
 import mitsuba as mi
@@ -125,6 +126,16 @@ def test_a_sheet_s_flat_side_sends_back_orders_by_the_depths_of_both_passages():
     power = table.window_sum(k * u, k * v, k * path.width(*ends)) * (k * table.sigma) ** 2 / np.pi
     expected = power * path.common(*ends, 0.0) * wo[:, 2:]
     assert_allclose(found[..., 0, 0], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("coat", [METAL, COATED[0]], ids=["bare", "coat"])
+def test_energy_scales_light_by_both_directions_outside(coat):
+    (wi, wo, lam), bsdf = few(8, -1), load(**coat)
+    plain = matrices(bsdf, wi, wo, lam)
+    bsdf.energy.conserving = True
+    bsdf.energy._scale = SimpleNamespace(at=lambda direction, site: [direction.z] * 4)
+    expected = plain * (wi[:, 2] * wo[:, 2])[:, None, None, None]
+    assert_allclose(matrices(bsdf, wi, wo, lam), expected, rtol=1e-5, atol=1e-9)
 
 
 def test_options_of_other_kernels_are_told_apart():
