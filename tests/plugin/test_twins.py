@@ -11,8 +11,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.plugin.boundary import HeightStatistic
+from mitsuba_diffraction.plugin.conductors import tabulated_index
 from mitsuba_diffraction.plugin.direction_lookup import DirectionLookup
 from mitsuba_diffraction.plugin.directions import PatchFrame, Site, TablePoint
 from mitsuba_diffraction.plugin.energy import _excess_of, reflectors_of
@@ -23,9 +25,14 @@ from mitsuba_diffraction.tables.colour.table import cached_colours
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy
 from tests.support.directions import rough_patch
+from tests.support.kinds import FILMED
 from tests.support.layered import load
 from tests.support.patches import SPECKLE
 
+MATERIALS = {
+    "film": FILMED[0] | {"film_k": 0.1},
+    "stack": {"int_ior": 1.56, "layers": 'layers = [["1.38", 0.1], ["Ag", 0.02], ["2.1", 0.15]]'},
+}
 #: Evenly on a sphere, as (u, v, w) of pairs of directions.
 PLACES = np.random.default_rng(2).normal(size=(40, 3)) * [0.4, 0.4, 0.0] + [0.0, 0.0, 1.7]
 
@@ -61,6 +68,29 @@ def test_the_statistic_of_heights_is_the_table_s_at_every_frequency():
         (found,) = HeightStatistic(roughness).at(place, 2.0, [11.0])
         assert found.kappa == pytest.approx(33.0)
         assert found.variance == pytest.approx(roughness.at(q), rel=1e-4)
+
+
+def test_a_metal_s_index_is_over_that_of_the_medium_above():
+    structure, si = load(material="Au", ext_ior=1.333).boundary.material, mi.SurfaceInteraction3f()
+    waves = np.array([400.0, 500.0, 600.0, 700.0])
+    si.wavelengths = mi.UnpolarizedSpectrum(*waves.tolist())
+    found = [complex(n.real, n.imag) for n in structure.indices(si, True)]
+    # Mitsuba's spectra have even wavelengths
+    assert_allclose(found, np.interp(waves, *tabulated_index("Au")) / 1.333, rtol=0.01)
+
+
+@pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
+def test_a_material_has_its_index_up_to_the_ends_of_the_table(material, tmp_path):
+    if "layers" in material:
+        (tmp_path / "a.toml").write_text(material["layers"])
+        material = material | {"layers": str(tmp_path / "a.toml")}
+    structure, si = load(**material).boundary.material, mi.SurfaceInteraction3f()
+    waves = np.array([360.0, 480.0, 650.0, 830.0])  # a stack is linear between nodes
+    si.wavelengths = mi.UnpolarizedSpectrum(*waves.tolist())
+    for cosine in (0.25, 0.9):
+        found = [reflectance(cosine, index) for index in structure.indices(si, True)]
+        expected = reflectance(np.array([cosine]), structure.at(waves)[:, None])[:, 0]
+        assert_allclose(found, expected, rtol=1e-4, atol=4e-3 if "layers" in material else 0.0)
 
 
 def test_in_colours_orders_and_order_0_of_a_window_add_up_to_the_table_s():
