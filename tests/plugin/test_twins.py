@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
+from mitsuba_diffraction.optics.materials import TISSUES
 from mitsuba_diffraction.plugin.boundary import HeightStatistic
 from mitsuba_diffraction.plugin.conductors import tabulated_index
 from mitsuba_diffraction.plugin.direction_lookup import DirectionLookup
@@ -74,9 +75,13 @@ def test_a_metal_s_index_is_over_that_of_the_medium_above():
     structure, si = load(material="Au", ext_ior=1.333).boundary.material, mi.SurfaceInteraction3f()
     waves = np.array([400.0, 500.0, 600.0, 700.0])
     si.wavelengths = mi.UnpolarizedSpectrum(*waves.tolist())
-    found = [complex(n.real, n.imag) for n in structure.indices(si, True)]
-    # Mitsuba's spectra have even wavelengths
-    assert_allclose(found, np.interp(waves, *tabulated_index("Au")) / 1.333, rtol=0.01)
+    expected, water = np.interp(waves, *tabulated_index("Au")) / 1.333, TISSUES["water"].index
+    for dispersion in (1.0, (water(waves) / water(np.array([589.3]))).real):
+        found = [complex(n.real, n.imag) for n in structure.indices(si, True)]
+        # Mitsuba's spectra have even wavelengths
+        assert_allclose(found, expected / dispersion, rtol=5e-3)
+        structure.disperse("water", 550.0)
+    assert np.ptp(dispersion) > 0.005
 
 
 @pytest.mark.parametrize("material", MATERIALS.values(), ids=MATERIALS)
