@@ -17,7 +17,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..optics.arithmetic import is_complex, squared
+from ..optics.arithmetic import is_complex, of, squared
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
 from ..optics.boundary import (
     SAME_DIRECTION,
@@ -297,5 +297,5 @@ def _mueller(jones: Jones) -> list[Float]:
 
 
 def _product(x: Number, y: Number) -> Number:
-    """x y*."""
-    return x * dr.conj(y) if is_complex(x) else x * y
+    """x y*, of Python's numbers too, of which `dr.conj` is no conjugate."""
+    return x * of(y).complex(y.real, -y.imag) if is_complex(x) else x * y

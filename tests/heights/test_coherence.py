@@ -13,6 +13,7 @@ from mitsuba_diffraction.heights.coherence import (
     resolved,
     resolved_width,
     widest_window,
+    window_places,
     window_warning,
 )
 from mitsuba_diffraction.heights.field import HeightField
@@ -112,3 +113,12 @@ def test_lobes_of_a_patch_as_wide_as_the_window_add_up_evenly(place):
     # the README's scan of 10 µm under 65 µm: dark between the orders
     if abs(place - 0.5) < 0.3:
         assert sums(65 / 4, 10.0) < 0.02  # of a lobe's peak: exp(−(0.2·2πσ/L)²) = 0.016
+
+
+@pytest.mark.parametrize("window", [97.0, 131.0, 230.0])
+def test_windows_of_a_scan_are_no_longer_than_asked_and_reach_its_end(window):
+    starts, length = window_places(1000, window)
+    assert 0.9 * window < length <= window
+    assert starts[0] == 0
+    assert starts[-1] == 1000 - length
+    assert np.diff(starts).max() <= 0.55 * length  # they overlap by half

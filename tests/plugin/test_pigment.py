@@ -116,6 +116,15 @@ def _transmitted(angle, n):
     return 1.0 - 0.5 * (s**2 + p**2)
 
 
+def test_beyond_its_ends_a_spectrum_is_constant(some_variant, tmp_path):
+    file = tmp_path / "brown.csv"
+    file.write_text("wl,brown\n350,0.1\n360,0.2\n790,0.3\n800,0.4\n")
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi, si.wavelengths = mi.Vector3f(0, 0, 1), mi.UnpolarizedSpectrum(300.0, 350.0, 800.0, 850.0)
+    found = np.ravel(pigment_bsdf(str(file)).eval_diffuse_reflectance(si))
+    assert found == pytest.approx([0.1, 0.1, 0.4, 0.4])
+
+
 @pytest.mark.parametrize(
     ("content", "named"),
     [

@@ -87,6 +87,25 @@ def test_the_depth_changes(variant):
         parameters.update()
 
 
+def test_weights_are_shares_of_their_sum_and_components_follow_each_other():
+    mi.set_variant("scalar_spectral_polarized")
+    white = {
+        "type": "bitmap",
+        "raw": True,
+        "data": mi.TensorXf(np.full((2, 2, 1), 0.2, np.float32)),
+    }
+    mix = mi.load_dict(
+        {"type": "diffraction_mix", "first": {"type": "plastic"}, "weight_first": white,
+         "second": {"type": "diffuse"}, "weight_second": 0.3}
+    )  # fmt: skip
+    si = mi.SurfaceInteraction3f()
+    si.wi = mi.Vector3f(0.0, 0.6, 0.8)
+    assert mix.weights.at(si, True) == pytest.approx([0.4, 0.6])
+    for component in range(mix.component_count()):  # the first has two
+        context = mi.BSDFContext(mi.TransportMode.Radiance, 0xFFFFFFFF, component)
+        assert mix.sample(context, si, 0.5, [0.3, 0.4])[0].sampled_component == component
+
+
 def named(**change):
     """The dictionary of a mix over depth, with some parts replaced."""
     return {"type": "diffraction_mix", "depth": 0.2, **surfaces()} | change

@@ -84,6 +84,7 @@ def listed_grating() -> OrderTable:
     return listed_table(lights, (PERIOD, np.inf), {"profile": "thin sinusoid"})
 
 
+@functools.cache
 def shallow_grating(
     index: complex,
     strength: float = 0.0,

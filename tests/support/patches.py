@@ -16,6 +16,11 @@ WIDTH = 4.5
 #: Several wavelengths deep.
 DEEP = rough_patch((64, 64), (0.08, 0.08), 1.2)
 DEFAULTS = {"coherence_width": WIDTH}
+#: Arguments of a small table of one window, whose colours are summed in a second.
+SPECKLE = {
+    "heights": rough_patch((24, 26), (0.15, 0.15), 0.15), "coherence_width": 3.0,
+    "coherence": "patch",
+}  # fmt: skip
 #: Part of a larger surface: it limits the window of all orders but 0.
 SMALL_SCAN = HeightField(PATCH.heights, PATCH.pixel_size, name="small scan", cut_out=True)
 

@@ -34,11 +34,15 @@ void main()
 #endif
 #endif
     vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
-#ifdef ORDERS
+#ifdef VALUE
+    fragment = VALUE;
+#elif defined(ORDERS)
 #ifndef PAIRED
     vec3 wi = vec3(0.0, 0.0, 1.0), wo = vec3(place.xy, sqrt(1.0 - dot(place.xy, place.xy)));
 #endif
     fragment = vec4(diffraction(wi, wo, vec2(1.0, 0.0), 0), 1.0);
+#elif defined(DIFFRACTING)
+    fragment = vec4(diffraction(wi, wo, vec2(place.x, 0.0), 0), 1.0);  // stretched
 #else
     fragment = vec4(diffracted(place.xy, place.z, place.w, 0), 1.0);
 #endif
@@ -53,7 +57,10 @@ def difference(found: NDArray[Any], exact: NDArray[Any]) -> float:
 
 
 def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArray[np.float64]:
-    """A method's colours (n, 3) at places (n, 4): u, v, z and the cosine at the half vector."""
+    """A method's colours (n, 3) at places (n, 4): u, v, z and the cosine at the half vector.
+
+    A definition VALUE is an expression of GLSL to be evaluated instead.
+    """
     picture = np.ascontiguousarray(places[None], np.float32)
     parts = packed | Packed(
         (Texture("places", picture),), {"light_colour": np.ones((4, 3), np.float32)}

@@ -171,3 +171,17 @@ def test_a_digest_is_of_what_is_looked_up_alone():
         dataclasses.replace(table, roughness=dataclasses.replace(table.roughness, first=-3.0)),
     ):
         assert changed.digest() != table.digest()
+
+
+def test_each_setting_and_the_heights_make_another_key(monkeypatch):
+    keys = []
+    monkeypatch.setattr(source, "cached", lambda kind, key, *more: keys.append(key))
+    monkeypatch.setattr(source, "named", lambda table, names: table)
+    names = [field.name for field in dataclasses.fields(TableSettings)]
+    for name in (None, *names):
+        settings = TableSettings()
+        if name is not None:
+            object.__setattr__(settings, name, "another")  # whatever may be asked for
+        source.cached_table("heights", settings, lambda: None, ())
+    source.cached_table("others", TableSettings(), lambda: None, ())
+    assert len(set(keys)) == len(names) + 2

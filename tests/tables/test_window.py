@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import erf
 
 from mitsuba_diffraction.tables.window import (
     base_bin,
@@ -14,6 +15,7 @@ from mitsuba_diffraction.tables.window import (
     reach_error,
     tap_matrix,
     taps_for,
+    trims_for,
 )
 
 
@@ -67,3 +69,12 @@ def test_a_usual_look_up_reads_four_taps_and_a_coherent_one_five():
     step = 2 * np.pi / 4
     assert taps_for((step, step), 5e-4, coherent=False) == (4, 4)
     assert taps_for((step, step), 5e-4, coherent=True) == (5, 5)
+
+
+@pytest.mark.parametrize(("error", "trimmed"), [(0.012, False), (0.02, True)])
+def test_corners_left_out_and_all_beyond_the_taps_meet_the_error_together(error, trimmed):
+    trims = trims_for((0.8, 0.8), (5, 5), error, coherent=False)
+    assert bool(trims) == trimmed
+    share = 0.5 * np.diff(erf(0.8 * (np.arange(6) - 2.5)))  # of a tap, the mean over positions
+    rows = [share[trim : 5 - trim].sum() for trim in trims or [0] * 5]
+    assert share @ rows >= 1.0 - error

@@ -70,6 +70,15 @@ def test_points_on_a_regular_grid_are_arranged(tmp_path):
     assert field.heights.tolist() == [[0, 1, 2, 3], [10, 11, 12, 13], [20, 21, 22, 23]]
 
 
+def test_each_column_of_points_has_its_own_unit(tmp_path):
+    path = tmp_path / "a.txt"
+    rows = [f"{1e3 * x:g} {0.5 * y:g} {100.0 * (x + y):g}" for y in range(2) for x in range(3)]
+    path.write_text("\n".join(["x(nm) y(µm) z(pm)", *rows]), "utf-8")
+    field = HeightField.load(path, level="none")
+    assert field.pixel_size == (1.0, 0.5)
+    assert field.heights[1] == pytest.approx([1e-4, 2e-4, 3e-4])
+
+
 def test_missing_cells_are_filled_if_asked(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("1,1,1,1\n1,,nan,1\n1,1,1,1\n")

@@ -148,3 +148,14 @@ def test_files_are_loaded_by_name(some_variant, tmp_path):
     assert "0.6 µm" in str(bsdf)
     with pytest.raises(Exception, match="does not exist"):
         mi.load_dict({"type": "diffraction_orders", "filename": str(tmp_path / "none.nc")})
+
+
+def test_in_colours_grazing_light_of_a_mirror_is_reciprocal():
+    mi.set_variant("scalar_rgb")
+    bsdf, si, context = load(OrderTable.mirror(0.6)), mi.SurfaceInteraction3f(), mi.BSDFContext()
+    values = []
+    for came, left in ((80.0, 83.0), (83.0, 80.0)):
+        si.wi, wo = (mi.Vector3f(*polar(*each).tolist()) for each in ((came, 0), (left, 180)))
+        values.append(np.ravel(bsdf.eval(context, si, wo)) / wo.z)
+    assert values[0] == pytest.approx(values[1], rel=1e-5)
+    assert values[0].min() > 0.0

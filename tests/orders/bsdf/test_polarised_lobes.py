@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -13,11 +14,10 @@ from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.reference.boundary import mueller
 from mitsuba_diffraction.reference.fresnel import amplitudes
 from tests.support.directions import Array, as_single, polar
+from tests.support.lanes import interaction, vectors
 from tests.support.orders import load, shallow_grating
 from tests.support.stokes import bases, rotation
-from tests.support.variants import interaction, runs
-
-pytestmark = pytest.mark.thorough
+from tests.support.variants import runs
 
 INDEX = 0.9 + 6.0j
 LAM = np.array([510.0, 540.0, 570.0, 595.0])
@@ -25,26 +25,38 @@ WI = as_single([polar(theta, phi) for theta, phi in ((0, 0), (30, 10), (56, 100)
 MODES = ["Radiance", "Importance"]
 
 
-@pytest.fixture
-def polarised() -> None:
-    """The fastest polarised variant, if it runs."""
-    name = "llvm_ad_spectral_polarized"
-    if name not in mi.variants() or not runs(name):
-        pytest.skip(f"{name} does not run on this machine")
-    mi.set_variant(name)
+#: The first has no kernels to compile.
+VARIANTS = [
+    "scalar_spectral_polarized",
+    pytest.param("llvm_ad_spectral_polarized", marks=pytest.mark.thorough),
+]
+
+
+@pytest.fixture(params=VARIANTS)
+def polarised(request: pytest.FixtureRequest) -> None:
+    """A polarised variant, if it runs."""
+    if request.param not in mi.variants() or not runs(request.param):
+        pytest.skip(f"{request.param} does not run on this machine")
+    mi.set_variant(request.param)
 
 
 def matrices(bsdf: Any, wi: Array, wo: Array, mode: str, wavelengths: Array = LAM) -> Array:
     """f·cosθo, (n, wavelengths, 4, 4)."""
     context = mi.BSDFContext(getattr(mi.TransportMode, mode))
-    si = interaction(wi, np.tile(wavelengths, (len(wi), 1)))
-    return np.moveaxis(np.array(bsdf.eval(context, si, mi.Vector3f(wo.T)), float), (3, 2), (0, 1))
+    if dr.is_jit_v(mi.Float):
+        si = interaction(wi, np.tile(wavelengths, (len(wi), 1)))
+        found = np.array(bsdf.eval(context, si, mi.Vector3f(wo.T)), float)
+        return np.moveaxis(found, (3, 2), (0, 1))
+    pairs = zip(wi, wo, strict=True)
+    values = [bsdf.eval(context, interaction(i, wavelengths), vectors(o)) for i, o in pairs]
+    return np.moveaxis(np.array(values, float), 3, 1)
 
 
 def normalised(values: Array) -> Array:
     return values / values[..., :1, :1]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("mode", MODES)
 def test_a_flat_metal_polarises_as_mitsuba_s_conductor(polarised, mode):
     spectra = {name: {"type": "uniform", "value": v} for name, v in (("eta", 0.9), ("k", 6.0))}
@@ -110,6 +122,7 @@ def test_a_metal_under_a_coat_has_the_matrices_of_both_mirrors(polarised, mode):
         assert found == pytest.approx(turned / turned[0, 0], abs=0.015)
 
 
+@pytest.mark.thorough
 def test_the_first_entry_is_the_light_of_unpolarised_variants(polarised):
     table, wo = shallow_grating(INDEX, 0.1), WI * [-1, -1, 1]
     polarised_light = matrices(load(table), WI, wo, "Radiance")[..., 0, 0]
@@ -119,6 +132,7 @@ def test_the_first_entry_is_the_light_of_unpolarised_variants(polarised):
     assert polarised_light == pytest.approx(value, rel=1e-5)  # single precision
 
 
+@pytest.mark.thorough
 def test_a_spectrometer_sees_fresnel_s_reflectances_of_a_flat_metal(polarised):
     spectra = md.spectrum(
         load(shallow_grating(INDEX)), 56.0, [56.0], light_azimuth=25.0, relative="mirror",

@@ -46,6 +46,14 @@ def test_a_glass_of_a_catalogue_has_its_index_at_the_d_line(tmp_path):
     assert index(file, 2325.42, ":N-BK7") == pytest.approx(1.48921, abs=1e-5)
 
 
+def test_the_last_of_a_catalogue_s_terms_counts(tmp_path):
+    file = tmp_path / "a.agf"
+    # formula, its number of terms a λ²/(λ² − b), of which the last has a = 1.25 and b = 0
+    for formula, terms in ((2, 3), (6, 4), (11, 5)):
+        file.write_text(f"NM A {formula} 0 0 0\nCD {'0 0 ' * (terms - 1)}1.25 0\nLD 0.3 1\n")
+        assert index(file, 500.0, ":A") == pytest.approx(1.5)
+
+
 def test_formulas_and_tables_of_yaml_are_read(tmp_path):
     (tmp_path / "sio2.yml").write_text(SILICA)
     (tmp_path / "au.yaml").write_text(GOLD)

@@ -11,6 +11,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
 from mitsuba_diffraction.orders.rows import Kind, rows, wavelength_of
+from mitsuba_diffraction.orders.table import MARGIN
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.orders import thin_grating
 
@@ -165,3 +166,10 @@ def test_a_file_of_another_version_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("mitsuba_diffraction.orders.file.FORMAT_VERSION", 99)
     with pytest.raises(DiffractionError, match="this program reads 99"):
         OrderTable.load(tmp_path / "grating.nc")
+
+
+def test_light_a_little_beyond_the_wavelengths_has_orders_and_farther_light_has_none():
+    low, high = GRATING.wavelengths
+    for factor, lit in ((2.0 ** (0.9 * MARGIN), True), (2.0 ** (1.1 * MARGIN), False)):
+        found = GRATING.efficiency(-0.1, 0.2, np.array([low / factor, high * factor]), 0)
+        assert np.all((found > 0.0) == lit)

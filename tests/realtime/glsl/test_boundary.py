@@ -21,7 +21,7 @@ from mitsuba_diffraction.realtime.glsl.packing import (
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.reference import boundary, fresnel, model
-from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables.colour.table import cached_colours
 from tests.support.directions import as_single, uniform_directions
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
@@ -95,7 +95,7 @@ def shaded(
 
 @pytest.mark.parametrize("kind", MATERIALS)
 def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, kind: str) -> None:
-    table_of_colours = ColourTable.build(table)
+    table_of_colours = cached_colours(table)
     colours = pack_colours(table_of_colours)
     pair = apart(pairs(600), table_of_colours.radius_end)
     plain = probed(gl, "fast", colours | PERFECT, pair[2])
@@ -122,7 +122,7 @@ def probed_reflectance(
 
 def test_lut_has_the_tint_of_a_metal(gl: Any, table: DiffractionTable) -> None:
     pair, lam = pairs(50), np.arange(360.0, 830.5)
-    colours = pack_colours(ColourTable.build(table)) | MATERIALS["conductor"]
+    colours = pack_colours(cached_colours(table)) | MATERIALS["conductor"]
     plain = shaded(gl, "fast", table, colours | UNTINTED, pair)
     spectrum = fresnel.reflectance(1.0, index("conductor", lam))
     weights = linear_srgb(response(lam))

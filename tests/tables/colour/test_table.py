@@ -9,10 +9,9 @@ from mitsuba_diffraction import DiffractionTable, DiffractionWarning, HeightFiel
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.tables.colour import table as colour_table
-from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables.colour.table import ColourTable, cached_colours
 from tests.support.directions import Array, rough_patch
-
-pytestmark = pytest.mark.thorough
+from tests.support.patches import SPECKLE
 
 WIDTH = 10.0  # µm: wide lobes, which small tables hold
 
@@ -37,6 +36,7 @@ def directions(n: int, seed: int = 0) -> tuple[Array, Array, Array]:
 
 
 CASES = {
+    "small": (SPECKLE["heights"], SPECKLE),
     "rough": (rough_patch((40, 48), (0.2, 0.25), 0.4), {}),
     "taylor": (rough_patch((40, 48), (0.2, 0.25), 0.2), {"basis": "taylor"}),
     "patch": (rough_patch((40, 48), (0.2, 0.25), 0.4), {"coherence": "patch"}),
@@ -47,11 +47,16 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+QUICK = "small"
+
+
+@pytest.mark.parametrize(
+    "case", [QUICK, *(pytest.param(c, marks=pytest.mark.thorough) for c in CASES if c != QUICK)]
+)
 def test_colours_are_the_integral_over_wavelengths(case: str) -> None:
     heights, arguments = CASES[case]
-    table = DiffractionTable.build(heights, **{"coherence_width": WIDTH, **arguments})
-    colours = ColourTable.build(table)
+    table = DiffractionTable.build(**{"heights": heights, "coherence_width": WIDTH, **arguments})
+    colours = cached_colours(table)
     u, v, w = directions(120)
     expected, found = integral(table, u, v, w), colours.colour(u, v, w)
     away = np.hypot(u, v) > 3.0 * colours.radius_end / 4.5
@@ -62,6 +67,7 @@ def test_colours_are_the_integral_over_wavelengths(case: str) -> None:
         assert error < tolerance
 
 
+@pytest.mark.thorough
 def test_heights_scaled_alike_have_the_same_colours() -> None:
     heights = rough_patch((40, 48), (0.2, 0.25), 0.3)
     taller = HeightField(1.4 * heights.heights, heights.pixel_size)
@@ -72,6 +78,7 @@ def test_heights_scaled_alike_have_the_same_colours() -> None:
     assert np.abs(found - expected).sum() < 0.01 * np.abs(expected).sum()  # two series in z
 
 
+@pytest.mark.thorough
 def test_a_mirror_reflects_white() -> None:
     table = DiffractionTable.build(HeightField(np.zeros((8, 8)), 0.5), coherence_width=65.0)
     colours = ColourTable.build(table)
@@ -82,6 +89,7 @@ def test_a_mirror_reflects_white() -> None:
     assert albedo == pytest.approx(np.ones(3), abs=1e-3)  # linear between 256 radii
 
 
+@pytest.mark.thorough
 def test_spectral_colours_stay_outside_the_displays_gamut() -> None:
     heights = gratings.blazed(period=2.0, depth=0.25, periods=6, rows=8)
     colours = ColourTable.build(DiffractionTable.build(heights, coherence_width=12.0))
@@ -91,6 +99,7 @@ def test_spectral_colours_stay_outside_the_displays_gamut() -> None:
     assert found[:, 0].min() < -0.2 * found[:, 1].max()
 
 
+@pytest.mark.thorough
 def test_the_map_of_a_patch_has_the_spectral_colours() -> None:
     table = DiffractionTable.build(rough_patch((48, 48), (0.25, 0.25), 0.3), coherence_width=WIDTH)
     x = np.linspace(-0.97, 0.97, 33)
@@ -107,6 +116,7 @@ def test_the_map_of_a_patch_has_the_spectral_colours() -> None:
     assert np.percentile(difference, 99) <= 3.0
 
 
+@pytest.mark.thorough
 def test_a_table_too_large_is_coarser_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(colour_table, "MAX_BYTES", 4_400_000)
     table = DiffractionTable.build(rough_patch((40, 48), (0.2, 0.25), 0.4), coherence_width=20.0)

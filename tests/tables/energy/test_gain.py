@@ -11,6 +11,18 @@ from mitsuba_diffraction.tables.energy.conserved import Transmitter
 from mitsuba_diffraction.tables.energy.gain import PathGain
 from tests.support.directions import rough_patch
 
+
+def test_heights_scaled_alike_have_the_same_gain():
+    patch = rough_patch((40, 44), (0.09, 0.09), 0.1)
+    light = np.array(0.7), np.array(0.5), 0.3
+    gains = [
+        PathGain(Path(0.9 + 6.0j, "small_slope"), roughness.table(50.0), 11.0, scale).exact(*light)
+        for heights, scale in ((patch.heights, 1.5), (1.5 * patch.heights, 1.0))
+        for roughness in [ScaleRoughness.from_heights(heights, patch.pixel_size)]
+    ]
+    assert gains[0] == pytest.approx(gains[1])
+
+
 PATHS = [
     pytest.param(path, id=f"{name} {path.came.number}-{path.left.number}")
     for name, thin in (("surface", False), ("sheet", True))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,15 @@ def test_another_material_is_computed_anew(computed):
     for index in (1.5, 1.5000001, 1.6, 1.5 + 0.1j):  # the second is the first to rounding
         energy(index).at(1.0)
     assert [index for _, index in computed] == [1.5, 1.6, 1.5 + 0.1j]
+
+
+def test_another_coat_light_or_use_beneath_is_another_record(computed):
+    first = energy()
+    coated = replace(first.material, coat=1.3)
+    others = {"material": coated}, {"beneath": True}, {"wavelength_range": (450.0, 700.0)}
+    for surface in (first, *(replace(first, **other) for other in others)):
+        surface.at(1.0)
+    assert len(computed) == 4
 
 
 def test_other_settings_are_another_record(computed):

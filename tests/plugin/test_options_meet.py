@@ -1,0 +1,145 @@
+"""Options that meet, in a scalar variant: a few directions, without a kernel to compile.
+
+The thorough tests ask more of each: test_kinds_thorough.py, test_polarised.py, test_sides.py.
+"""
+
+from __future__ import annotations
+
+import itertools
+from types import SimpleNamespace
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.geometry import wavenumber
+from mitsuba_diffraction.optics.paths import ABOVE, Returned
+from tests.support.directions import Array
+from tests.support.kinds import COATED, FILMED, METAL, MORE, PLACED, PLANE, SLOPE, Kind, lit
+from tests.support.lanes import interaction, vectors
+from tests.support.layered import PATCH, WIDTH, load
+from tests.support.stokes import REVERSAL, bases, rotation
+from tests.support.transmitting import BELOW, INDICES, SIDES, both
+from tests.support.variants import runs
+
+#: Where light falls; v runs against the second axis of the frame.
+UV = np.array([0.4, -0.9])
+#: A quarter of the way from 100 to 700 nm.
+SHARES = {"type": "bitmap", "raw": True}
+ENDS = {"film_thickness": SHARES, "film_thickness_min": 100.0, "film_thickness_max": 700.0}
+SURFACE = {"coherence": "surface", "uv_scale": 10.0}
+MEETING = {
+    "film on a dielectric": MORE["film on a dielectric"],
+    "film of a texture, tangent plane, lower": Kind(
+        FILMED[0] | ENDS | PLANE | {"height_scale": 0.5}, FILMED[1] | PLANE, height=0.5
+    ),
+    "one window of a metal": Kind(
+        METAL | {"coherence": "patch"}, METAL | SLOPE | {"coherence": "patch"}
+    ),
+    "surface under a coat, narrower": Kind(
+        COATED[0] | SURFACE | {"lateral_scale": 0.7}, COATED[1] | SLOPE | PLACED, stretch=0.7
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def without_kernels() -> None:
+    if not runs("scalar_spectral_polarized"):
+        pytest.skip("scalar_spectral_polarized is not here")
+    mi.set_variant("scalar_spectral_polarized")
+
+
+def matrices(bsdf: Any, wi: Array, wo: Array, lam: Array, mode: str = "Radiance") -> Array:
+    """f·|cosθo|, Mueller matrices (n, 4, 4, 4), of pairs (n, 3) and wavelengths (n, 4)."""
+    context, found = mi.BSDFContext(getattr(mi.TransportMode, mode)), []
+    for i, o, waves in zip(wi, wo, lam, strict=True):
+        si = interaction(i, waves)
+        si.uv, si.dp_du, si.dp_dv = mi.Point2f(*UV.tolist()), [1, 0, 0], [0, -1, 0]
+        found.append(np.moveaxis(np.array(bsdf.eval(context, si, vectors(o)), float), 2, 0))
+    return np.array(found)
+
+
+def few(*chosen: int) -> tuple[Array, Array, Array]:
+    """Pairs: the first hundred are near the mirror direction."""
+    wi, wo, lam = lit("metal", 200)
+    return wi[[*chosen]], wo[[*chosen]], lam[[*chosen]]
+
+
+@pytest.mark.parametrize("kind", MEETING)
+def test_light_is_the_reference_s(kind):
+    parameters, known, stretch, height = MEETING[kind]
+    wi, wo, lam = few(8, -1)
+    if "film_thickness_max" in parameters:
+        quarter = mi.TensorXf(np.full((2, 2, 1), 0.25, np.float32))
+        parameters = parameters | {"film_thickness": SHARES | {"data": quarter}}
+    found = matrices(load(**parameters), wi, wo, lam)
+    patch = md.HeightField(height * PATCH.heights, PATCH.pixel_size).stretched(stretch)
+    own = {"coherence_width": WIDTH * stretch} | known
+    own |= {"place": 10.0 * UV * [1, -1]} if "place" in known else {}
+    s_in, s_out = reference.boundary.polarisation_axes(wo, wi)  # light comes along ωo
+    before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)
+    for n, one in enumerate(lam.T):
+        expected = after @ reference.mueller(patch, wo, wi, one, **own) @ before
+        expected *= wo[:, 2, None, None]
+        # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+        assert_allclose(found[:, n], expected, rtol=1e-3, atol=1e-5 * expected.max())
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_light_that_goes_through_has_the_transposed_matrix_in_reverse(kind):
+    wi, wo, lam = few(8)
+    wo, bsdf = wo * BELOW, both(**SIDES[kind])
+    there, back = matrices(bsdf, wi, wo, lam), matrices(bsdf, wo, wi, lam)
+    there, back = (m / np.abs(w[:, None, 2, None, None]) for m, w in ((there, wo), (back, wi)))
+    # importance goes along ωi, and is not n² times as large in the dielectric
+    adjoint = matrices(bsdf, wo, wi, lam, "Importance") / wi[:, None, 2, None, None]
+    back = back / (2.25 if kind == "dielectric" else 1.0)
+    after = rotation(bases(wo), bases(-wo), wo)[:, None]
+    before = rotation(bases(-wi), bases(wi), -wi)[:, None]
+    expected = REVERSAL @ there.swapaxes(-1, -2) @ REVERSAL
+    for found, known in ((after @ back @ before, expected), (adjoint, there)):
+        assert_allclose(found, known, rtol=1e-4, atol=1e-5 * there.max())
+
+
+def test_below_a_sheet_light_is_that_of_air_under_a_coat_in_a_mirror():
+    wi, wo, lam = few(8)
+    found = matrices(both(thin=True), wi * BELOW, wo * BELOW, lam)
+    turned = md.HeightField(-PATCH.heights, PATCH.pixel_size)
+    above = matrices(load(turned, eta=1.0, k=0.0, coat_ior=1.5), wi, wo, lam)
+    flip = np.diag([1.0, 1.0, -1.0, -1.0])  # axes of the image are s and −p
+    before = flip @ rotation(bases(-wo * BELOW), bases(-wo) * BELOW, -wo * BELOW)
+    after = rotation(bases(wi) * BELOW, bases(wi * BELOW), wi * BELOW) @ flip
+    expected = after[:, None] @ above @ before[:, None]
+    assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * expected.max())
+
+
+def test_a_sheet_s_flat_side_sends_back_orders_by_the_depths_of_both_passages():
+    wi, wo, lam = few(-2, -1)  # far from order 0
+    sheet = both(thin=True)
+    found = matrices(sheet, wi, wo, lam) - matrices(load(**INDICES), wi, wo, lam)
+    path, k, table = Returned(None, "", ABOVE, ABOVE, sheet=1.5), wavenumber(lam), sheet.table
+    (u, v, _), *ends = (wi + wo).T[:, :, None], wi[:, 2:], wo[:, 2:]
+    power = table.window_sum(k * u, k * v, k * path.width(*ends)) * (k * table.sigma) ** 2 / np.pi
+    expected = power * path.common(*ends, 0.0) * wo[:, 2:]
+    assert_allclose(found[..., 0, 0], expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("coat", [METAL, COATED[0]], ids=["bare", "coat"])
+def test_energy_scales_light_by_both_directions_outside(coat):
+    (wi, wo, lam), bsdf = few(8, -1), load(**coat)
+    plain = matrices(bsdf, wi, wo, lam)
+    bsdf.energy.conserving = True
+    bsdf.energy._scale = SimpleNamespace(at=lambda direction, site: [direction.z] * 4)
+    expected = plain * (wi[:, 2] * wo[:, 2])[:, None, None, None]
+    assert_allclose(matrices(bsdf, wi, wo, lam), expected, rtol=1e-5, atol=1e-9)
+
+
+def test_options_of_other_kernels_are_told_apart():
+    options = {}, {"shadowing": "vcavity"}, {"coat_ior": 1.58}, {"model": "kirchhoff"}, SURFACE
+    constants = [load(**METAL, **more).kernel_constants() for more in options]
+    assert all(a != b for a, b in itertools.combinations(constants, 2))
+    assert both().kernel_constants() != both(thin=True).kernel_constants()

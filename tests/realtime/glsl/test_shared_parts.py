@@ -1,0 +1,92 @@
+"""Parts that all shaders share: a pair of directions, the coat, speckle, and gloss."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import DiffractionTable, reference
+from mitsuba_diffraction.realtime.glsl.modelled import Modelled
+from mitsuba_diffraction.realtime.glsl.packing import pack_colours
+from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
+from mitsuba_diffraction.tables.colour.table import cached_colours
+from tests.support.kinds import COATED, SLOPE
+from tests.support.lanes import interaction, vectors
+from tests.support.layered import PATCH, WIDTH, load, pairs
+from tests.support.patches import SPECKLE
+from tests.support.shaders import PERFECT, difference, probed
+
+STRETCH, WAVELENGTH = 0.7, 550.0
+
+
+def paired(wi: NDArray[Any], wo: NDArray[Any]) -> Packed:
+    """Pairs of directions (n, 3)."""
+    directions = np.pad(np.stack([wi, wo]), [(0, 0)] * 2 + [(0, 1)]).astype("f4")
+    return Packed((Texture("directions", directions),), {}, {"PAIRED": ""})
+
+
+def test_a_stretched_patch_under_a_coat_has_the_reference_s_light(gl: Any) -> None:
+    mi.set_variant("scalar_spectral_polarized")
+    surface = Modelled(load(**COATED[0]).describe())
+    wi, wo, _ = pairs()
+    wi, wo = wi[::3], wo[::3]
+    near = np.arange(len(wi)) < 30
+    parts = surface.surface() | surface.tables("exact") | paired(wi, wo) | Packed(
+        uniforms={"height_scale": 1.0, "wavenumber": 2e3 * np.pi / WAVELENGTH},
+        definitions={"MONOCHROME": ""},
+    )  # fmt: skip
+    found = probed(gl, "exact", parts, np.full((len(wi), 4), STRETCH))[:, 0]
+    given = {"coherence_width": WIDTH * STRETCH} | COATED[1] | SLOPE
+    expected = reference.brdf(PATCH.stretched(STRETCH), wi, wo, WAVELENGTH, **given) * wo[:, 2]
+    for part in (near, ~near):
+        # cut windows, and a conductor's index between 96 wavelengths
+        assert difference(found[part], expected[part]) < 5e-3
+
+
+def test_colours_of_one_window_are_read_as_they_are(gl: Any) -> None:
+    colours = cached_colours(DiffractionTable.build(**SPECKLE))
+    rng = np.random.default_rng(2)
+    places = np.stack([*rng.normal(0.0, 0.4, (2, 300)), rng.uniform(0.02, 2.0, 300), np.ones(300)])
+    found = probed(gl, "fast", pack_colours(colours) | PERFECT, places.T)
+    expected = colours.colour(*places[:3])
+    assert difference(found, expected) < 3e-3  # eight digits of each number
+
+
+def test_gloss_is_mitsuba_s_and_a_base_burley_s(gl: Any) -> None:
+    mi.set_variant("scalar_spectral_polarized")
+    alpha, roughness = 0.3, 0.55
+    facets = {"type": "roughconductor", "material": "none", "distribution": "beckmann"}
+    facets = mi.load_dict(facets | {"alpha": alpha})
+    wi, wo, _ = (part[60:120:3] for part in pairs())
+    value = "vec4((base_colour = vec3(0.5), gloss(wi, wo).r), burley(wi, wo), 0.0, 1.0)"
+    parts = PERFECT | paired(wi, wo) | Packed(
+        uniforms={"gloss_alpha": alpha, "roughness": roughness, "metallic": 0.0},
+        definitions={"GLOSS": "", "PRINCIPLED": "", "VALUE": value},
+    )  # fmt: skip
+    found = probed(gl, "fast", parts, np.zeros((len(wi), 4)))
+    seen = [
+        np.ravel(mi.unpolarized_spectrum(facets.eval(mi.BSDFContext(), interaction(i, 550.0), o)))
+        for i, o in zip(wi, map(vectors, wo), strict=True)
+    ]
+    assert_allclose(found[:, 0], np.array(seen)[:, 0], rtol=1e-4, atol=1e-6)
+    # Burley 2012, section 5.3: F_D90 = 1/2 + 2 r cos²θd
+    fifth = (1.0 - wi[:, 2]) ** 5, (1.0 - wo[:, 2]) ** 5
+    thrown = 2.0 * roughness * 0.5 * (1.0 + (wi * wo).sum(axis=1))
+    lost = (1.0 - 0.5 * fifth[0]) * (1.0 - 0.5 * fifth[1])
+    back = thrown * (fifth[0] + fifth[1] + fifth[0] * fifth[1] * (thrown - 1.0))
+    assert_allclose(found[:, 1], lost + back, rtol=1e-4)
+
+
+def test_the_page_turns_a_patch_to_the_left(gl: Any) -> None:
+    turn, value = np.radians(30.0), "vec4(patch_frame(vec2(0.0), vec3(0.6, 0.8, 0.7)), 0.0, 1.0)"
+    parts = PERFECT | Packed(
+        uniforms={"patch_turn": (np.cos(turn), np.sin(turn))},
+        definitions={"LIVE": "", "VALUE": value},
+    )
+    (found,) = probed(gl, "fast", parts, np.zeros((1, 4)))
+    angle = np.arctan2(0.8, 0.6) + turn
+    assert_allclose(found[:2], 0.7 * np.array([np.cos(angle), np.sin(angle)]), rtol=1e-5)
