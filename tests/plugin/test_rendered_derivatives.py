@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from tests.support.directions import polar
 from tests.support.kinds import COATED, FILMED
 from tests.support.lanes import interaction, vectors
 from tests.support.layered import load, pairs
@@ -57,3 +58,26 @@ def test_values_have_the_derivatives_of_differences(mono, layer):
         expected = (high - low) / (2.0 * step)
         # single precision of the difference
         assert np.abs(slope - expected).sum() < 2e-3 * np.abs(expected).sum(), name
+
+
+@pytest.mark.parametrize("surface", ["metal", "places"])
+def test_derivatives_hold_in_pictures_of_any_size(mono, surface):
+    """A pixel's share of the mean over a picture, times a packed half float, is subnormal."""
+    bsdf = mi.load_dict(plate(surface, 6.0))
+    parameters, names = mi.traverse(bsdf), ("orientation", "lateral_scale")
+    wo = [polar(theta, 20.0) for theta in np.linspace(0.0, 80.0, 64)]
+    si = interaction(polar(10.0, 190.0), 550.0)
+
+    def derivatives(share: float) -> list[float]:
+        for name in names:
+            dr.enable_grad(parameters[name])
+            parameters.set_dirty(name)
+        parameters.update()
+        light = dr.sum(bsdf.eval(mi.BSDFContext(), si, vectors(wo))[0])
+        dr.backward(light * dr.opaque(mi.Float, share))
+        found = [dr.grad(parameters[name])[0] / share for name in names]
+        for name in names:
+            parameters[name] = dr.detach(parameters[name])
+        return found
+
+    assert derivatives(1e-6) == pytest.approx(derivatives(1.0), rel=1e-3)
