@@ -137,7 +137,10 @@ class DeviceTable:
         return self._place(x, y, self.series.at(kappa).interval)[0]
 
     def read(self, index: Index, scale: float = 1.0) -> list[Packet]:
-        """Numbers of the bin with this index, in packets; half floats times scale/`halves.scale`."""
+        """Numbers of the bin with this index, in packets.
+
+        scale : factor on half floats, which are over `HalfFloats.scale` without it.
+        """
         if self.halves is None:
             return read_packets(self._coefficients, index, self.record.numbers)
         packets = self.halves.read(index)
@@ -152,8 +155,9 @@ class DeviceTable:
         grid = self.grid
         # One factor on weights is cheaper than one on all numbers. A derivative by a weight is such
         # a number times a pixel's share of a picture: without the factor, single precision loses it
-        packed = self.halves is not None and not dr.grad_enabled(x, y)
-        scale = self.halves.scale if packed else 1.0
+        scale = 1.0
+        if self.halves is not None and not dr.grad_enabled(x, y):
+            scale = self.halves.scale
         column, across = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0], scale)
         row, along = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
         return grid.index(interval, row, column), across, along
