@@ -136,29 +136,42 @@ class DeviceTable:
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
         return self._place(x, y, self.series.at(kappa).interval)[0]
 
-    def read(self, index: Index) -> list[Packet]:
-        """Numbers of the bin with this index, in packets; half floats over `HalfFloats.scale`."""
-        if self.halves is not None:
-            return self.halves.read(index)
-        return read_packets(self._coefficients, index, self.record.numbers)
+    def read(self, index: Index, scale: float = 1.0) -> list[Packet]:
+        """Numbers of the bin with this index, in packets.
+
+        scale : factor on half floats, which are over `HalfFloats.scale` without it.
+        """
+        if self.halves is None:
+            return read_packets(self._coefficients, index, self.record.numbers)
+        packets = self.halves.read(index)
+        return packets if scale == 1.0 else [packet * scale for packet in packets]
+
+    def _unpacked(self, across: Gaussians) -> float:
+        """Factor on the numbers of a bin that weights lack."""
+        return 1.0 if self.halves is None else self.halves.scale / across.scale
 
     def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Gaussians, Gaussians]:
         """Index of the first bin read at (x, y) in bins; weights of the taps along x and y."""
         grid = self.grid
-        scale = 1.0 if self.halves is None else self.halves.scale
+        # One factor on weights is cheaper than one on all numbers. A derivative by a weight is such
+        # a number times a pixel's share of a picture: without the factor, single precision loses it
+        scale = 1.0
+        if self.halves is not None and not dr.grad_enabled(x, y):
+            scale = self.halves.scale
         column, across = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0], scale)
         row, along = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
         return grid.index(interval, row, column), across, along
 
     def _summed_packets(self, first: Index, across: Gaussians, along: Gaussians) -> list[Packet]:
         """Return the terms of all taps, summed with their Gaussian weights."""
+        unpacked = self._unpacked(across)
 
         def add_row(
             start: Index, columns: range, weight: Float, weights_x: Any, total: list[Packet]
         ) -> list[Packet]:
             row: list[Packet] = []
             for i in columns:
-                values = self.read(start + i)
+                values = self.read(start + i, unpacked)
                 if not row:
                     row = [v * weights_x[i] for v in values]
                 else:
@@ -180,6 +193,7 @@ class DeviceTable:
 
         weights : of the terms.
         """
+        unpacked = self._unpacked(across)
 
         def add_row(
             start: Index, columns: range, phases: list[Rotation], inputs: Any, total: list[Float]
@@ -187,7 +201,7 @@ class DeviceTable:
             steps, weights = inputs
             sums: list[Rotation] = [(mi.Float(0.0), mi.Float(0.0))] * len(windows)
             for i in columns:
-                parts = self._components(self.read(start + i))
+                parts = self._components(self.read(start + i, unpacked))
                 value = inner(parts[0], weights), inner(parts[1], weights)
                 sums = [_turned(value, x[i], row) for x, row in zip(steps, sums, strict=True)]
             for row, phase in zip(sums, phases, strict=True):
