@@ -37,12 +37,7 @@ Index = Number
 
 
 class Memory(Protocol):
-    """Arrays of a grid where a look-up runs, and sums over ports there.
-
-    scale : factor from the numbers that `read` returns to the numbers of the grid.
-    """
-
-    scale: float
+    """Arrays of a grid where a look-up runs, and sums over ports there."""
 
     def read(self, name: str, index: Index, numbers: int, active: Mask) -> Sequence[Number]:
         """Return the numbers of a record of an array of the grid; 0 in inactive lanes."""
@@ -56,8 +51,6 @@ class Memory(Protocol):
 
 class Arrays:
     """A grid in NumPy's memory."""
-
-    scale = 1.0
 
     def __init__(self, grid: OrderGrid) -> None:
         self._grid = grid
@@ -91,7 +84,7 @@ class Row(NamedTuple):
     start : record of port 0.
     channel : j of the incident light; entered : its port.
     channels : number of channels of a side.
-    weights : of the eight corners of a cell, times the scales of grid and memory.
+    weights : of the eight corners of a cell, times the grid's scale.
     lit : whether the table has light of the wavelength.
     x, y, wavelength : tangential part of ωi, and the wavelength in nm.
     face : share of the light that the coat's face reflects, 0 without a coat.
@@ -140,7 +133,7 @@ class Lookup:
     def __init__(self, table: OrderTable, grid: OrderGrid, memory: Memory, *, coated: bool) -> None:
         self.memory, self.sides = memory, table.sides
         self._cells, self._parts = grid.cells, grid.parts
-        self._scale = grid.scale * memory.scale
+        self._scale = grid.scale
         self.numbers = 0 if grid.elements is None else grid.elements.shape[1]
         self.has_chances = grid.chances is not None
         self._period, self._last = 1e3 * table.optical_period, float(table.last_band)
@@ -279,7 +272,7 @@ class Lookup:
         return [first + (a * (n_rho + 1) + b) * (n_w + 1) + c for a, b, c in corners]
 
     def totals(self, row: Row) -> Sequence[Number]:
-        """Return the sums of chances at the corners of a cell, over both scales."""
+        """Return the sums of chances at the corners of a cell, over the grid's scale."""
         record = (row.start + self.ports(row)) * self._parts + self._parts - 1
         return self.memory.read("corners", record, 8, row.lit)
 

@@ -111,11 +111,12 @@ class Device:
         # corners hold a record of 8 for each of their parts
         shapes = {k: v.reshape(-1, 8) if k == "corners" else v for k, v in arrays.items()}
         self._records = {k: HalfFloats(v) for k, v in shapes.items() if v.ndim == 2}
-        self.scale = self._records["corners"].scale
 
     def read(self, name: str, index: Index, numbers: int, active: Mask) -> Sequence[Float]:
         """See `Memory.read`."""
-        packets = self._records[name].read(index, active)
+        records = self._records[name]
+        # not on the weights: derivatives by them would be subnormal numbers
+        packets = [packet * records.scale for packet in records.read(index, active)]
         return [mi.Float(x) for packet in packets for x in packet][:numbers]
 
     def start(self, name: str, kind: Index) -> Index:
