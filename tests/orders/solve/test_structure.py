@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from docs.make.validation.light import light_on, powers_of
 from docs.make.validation.stacks import (
     BENEATH,
     MIRROR,
     RIDGES,
     by_ikarus,
-    efficiencies,
     quarter_wave_reflectance,
 )
-from docs.make.validation.stacks import stacked as grating
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
-from mitsuba_diffraction.orders.solve.films import read_layers
-from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of
+from mitsuba_diffraction.orders.solve.films import read_layers, structure_of
+from mitsuba_diffraction.orders.solve.grating_index import material_of
+from mitsuba_diffraction.orders.solve.jobs import AUTO, Jobs, problem_of, solver_of
 from mitsuba_diffraction.orders.solve.profiles import lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.resolution import places_to_test, resolved
-from mitsuba_diffraction.orders.solve.stations import reversed_light
+from mitsuba_diffraction.orders.solve.stations import Grating, reversed_light
 
 PERIOD = 0.5
 #: A slice of two materials and a gap, and a ridge across the period's end, as of a scale of Morpho.
@@ -28,6 +28,20 @@ SLICES = (
     (0.06, ("chitin", 0.05, 0.3), ("1.9+0.2i", 0.3, 0.35)),
     (0.09, ("chitin", 0.42, 0.58)),
 )
+
+
+def grating(profile, material="1.46", superstrate=1.0, **media):
+    """A grating with films and layers; media are arguments of `structure_of`."""
+    limits = (500.0, 600.0)
+    substance = material_of(material, limits)
+    structure = structure_of(profile, substance, limits, **media)
+    return Grating(profile, substance, superstrate, limits, structure=structure)
+
+
+def efficiencies(surface, harmonics, theta, wavelength):
+    """Efficiencies (2,) of s and p light by order, of light across the grooves."""
+    solver = solver_of(problem_of(surface, AUTO, harmonics))
+    return powers_of(solver, light_on(surface, -np.sin(np.radians(theta)), 0.0, wavelength))
 
 
 def solved(surface, harmonics, place=(1, 0, 0.35, 0.5), w=(0.5,)):
