@@ -21,6 +21,8 @@ from .expansion import Expansion
 
 #: Smaller half floats, which are subnormal, are stored as 0: kernels read them as 0, NumPy is slow.
 LEAST_HALF = 2.0**-14
+#: Distance of bins, in 1/σ, at which amplitudes of neighbouring lobes overlap by exp(−9).
+_APART = 6.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,11 @@ class Grid:
         """Columns that a look-up reads, of every row of taps."""
         columns, rows = self.taps
         return [range(trim, columns - trim) for trim in self.trims or (0,) * rows]
+
+    @property
+    def overlapping(self) -> bool:
+        """Whether lobes of neighbouring orders overlap, and interfere, under one window."""
+        return self.coherent and min(self.steps) < _APART
 
     @property
     def taps_read(self) -> int:

@@ -94,9 +94,9 @@ def order_mixture(
     lobe = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation
     # samples of a window's power have its lobes in them already: as strong orders, with lobes of
     # their own, they are for lobes that are narrow beside the smoothing
-    all_smooth = lobe >= (NARROW if table.grid.coherent else 1.0) * smoothing
+    all_smooth = lobe >= (NARROW if table.grid.overlapping else 1.0) * smoothing
     axes = [_Axis(table, axis, fine=2.0 * lobe > smoothing) for axis in (0, 1)]
-    if table.grid.coherent:  # powers between the bins have the lobes in them
+    if table.grid.overlapping:  # powers between the bins have the lobes in them
         apart_by = max(axis.frequency[1] - axis.frequency[0] for axis in axes)
         smoothing = math.sqrt(max(smoothing**2 - lobe**2, (_BRIDGED * apart_by) ** 2))
         pitch = min(0.5 * math.hypot(smoothing, lobe), _READ * smoothing)
@@ -107,7 +107,7 @@ def order_mixture(
     grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
     splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
     density = np.empty((count, 2 * half, 2 * half), np.float32)
-    apart = all_smooth and table.grid.coherent
+    apart = all_smooth and table.grid.overlapping
     beats = np.empty_like(density) if apart else None
     central = np.empty(count)
     powers = np.empty((count, 0), np.float32)
@@ -148,7 +148,7 @@ class _Axis:
         last, spacing = table.grid.last[axis], table.spacing[axis]
         step = table.grid.steps[axis]
         bins = np.arange(-last, last + 1)
-        if table.grid.coherent:
+        if table.grid.overlapping:
             # The window's power is as smooth as a lobe: sampled densely, its sum is its integral
             density = max(1, math.ceil(step / (_FINE if fine else _SAMPLED)))
             positions = np.arange(-last * density, last * density + 1) / density
@@ -190,7 +190,7 @@ class _Powers:
         scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
         parts = series_sum(self._coefficients, scaled).reshape(ny, nx, components)
         centre = float(order_0_power(table, kappa))
-        if table.grid.coherent:
+        if table.grid.overlapping:
             amplitude = parts[..., 0] + 1j * parts[..., 1]
             amplitude[table.grid.last[1], table.grid.last[0]] = complex(*table.order_0_at(kappa))
             field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T

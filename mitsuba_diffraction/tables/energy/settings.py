@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 43
+VERSION = 44
 
 
 @dataclass(frozen=True)

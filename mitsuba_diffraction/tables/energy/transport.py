@@ -73,7 +73,7 @@ class ScatteredOrders:
         # window of 4 µm on an index of 2.46 sums were 0.08 off without, and are 0.004 to 0.02
         smoothing = SMOOTHING * longest * math.sqrt(densest) * 0.5 * math.pi / settings.rings
         lobe = 1.0 / (math.sqrt(2.0) * table.sigma)
-        if table.grid.coherent and lobe >= NARROW * smoothing:  # which smoothing would widen
+        if table.grid.overlapping and lobe >= NARROW * smoothing:  # which smoothing would widen
             finer = max(finer, math.ceil(smoothing / lobe))
         rings, steps, smoothing = finer * settings.rings, finer * settings.steps, smoothing / finer
         # κ of light that stays within a dielectric is larger by the index

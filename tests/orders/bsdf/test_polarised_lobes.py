@@ -30,6 +30,7 @@ VARIANTS = [
     "scalar_spectral_polarized",
     pytest.param("llvm_ad_spectral_polarized", marks=pytest.mark.thorough),
 ]
+kernels_alone = pytest.mark.parametrize("polarised", VARIANTS[1:], indirect=True)
 
 
 @pytest.fixture(params=VARIANTS)
@@ -56,7 +57,7 @@ def normalised(values: Array) -> Array:
     return values / values[..., :1, :1]
 
 
-@pytest.mark.thorough
+@kernels_alone
 @pytest.mark.parametrize("mode", MODES)
 def test_a_flat_metal_polarises_as_mitsuba_s_conductor(polarised, mode):
     spectra = {name: {"type": "uniform", "value": v} for name, v in (("eta", 0.9), ("k", 6.0))}
@@ -122,7 +123,7 @@ def test_a_metal_under_a_coat_has_the_matrices_of_both_mirrors(polarised, mode):
         assert found == pytest.approx(turned / turned[0, 0], abs=0.015)
 
 
-@pytest.mark.thorough
+@kernels_alone
 def test_the_first_entry_is_the_light_of_unpolarised_variants(polarised):
     table, wo = shallow_grating(INDEX, 0.1), WI * [-1, -1, 1]
     polarised_light = matrices(load(table), WI, wo, "Radiance")[..., 0, 0]
@@ -132,7 +133,7 @@ def test_the_first_entry_is_the_light_of_unpolarised_variants(polarised):
     assert polarised_light == pytest.approx(value, rel=1e-5)  # single precision
 
 
-@pytest.mark.thorough
+@kernels_alone
 def test_a_spectrometer_sees_fresnel_s_reflectances_of_a_flat_metal(polarised):
     spectra = md.spectrum(
         load(shallow_grating(INDEX)), 56.0, [56.0], light_azimuth=25.0, relative="mirror",
