@@ -114,7 +114,7 @@ def hidden_by(name: str) -> Path | None:
 
 
 def names_of_the_package(source: str) -> Iterator[tuple[int, str]]:
-    """Lines and dotted names that a program imports, or reads from what it imports."""
+    """Lines and dotted names of a program's imports, and of attributes of imported modules."""
     bound: dict[str, str] = {}
     nodes = list(ast.walk(ast.parse(source)))
     for node in nodes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import statistics
+import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,11 +29,18 @@ WARM_UP = 2
 
 def kernel_seconds(call: Callable[[], Any]) -> float:
     """Return the execution time of the kernels of one call, s, without tracing in Python."""
+    return 1e-3 * sum(kernel["execution_time"] for kernel in kernel_records(call)[0])
+
+
+def kernel_records(call: Callable[[], Any]) -> tuple[list[dict[str, Any]], float]:
+    """Run a call; return Dr.Jit's records of its kernels, and the processor's seconds."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
-        dr.eval(call())
+        result = call()
+        start = time.process_time()
+        dr.eval(result)
         dr.sync_thread()
-        return 1e-3 * sum(kernel["execution_time"] for kernel in dr.kernel_history())
+        return list(dr.kernel_history()), time.process_time() - start
 
 
 def rounds_of(

@@ -297,5 +297,5 @@ def _mueller(jones: Jones) -> list[Float]:
 
 
 def _product(x: Number, y: Number) -> Number:
-    """x y*, of Python's numbers too, of which `dr.conj` is no conjugate."""
+    """Return x y*. `dr.conj` returns a Python complex number as it is."""
     return x * of(y).complex(y.real, -y.imag) if is_complex(x) else x * y

@@ -46,7 +46,7 @@ def maps_figure(
     figure = Figure(figsize=((side + 0.25) * columns + 0.45, (side + 0.45) * rows + 0.45))
     width, height = figure.get_size_inches()
     for column, field in enumerate(fields):
-        # periodic gratings are given by one period, and steep look-alikes are what is wanted
+        # a periodic grating is one period, and the look-alikes are steep on purpose
         bsdf = quiet_bsdf(field, material="none")
         for row, light in enumerate(lights):
             left = 0.55 + (side + 0.25) * column
