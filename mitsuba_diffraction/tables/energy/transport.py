@@ -41,11 +41,13 @@ SMOOTHING = 1.0
 #: Weak orders of less power in all are left out.
 LEAST_WEAK = 2e-3
 
-#: Width of order 0's lobe, in direction cosines, above which it is summed over all directions, as G
-#: differs from one azimuth to another. The quadrature resolves lobes half as wide.
-_WIDE = 0.08
+#: Width of order 0's lobe, in distances between rings, above which all directions are summed over:
+#: G differs from one azimuth to another, by 0.01 under 4 µm. The quadrature resolves such lobes.
+_WIDE = 1.15
 #: Pairs of a direction and an order, or another direction, that are looked at together.
 _PAIRS = 1 << 16
+#: How often distances between azimuths of incidence are halved, at most.
+_MOST_HALVED = 2
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
@@ -80,12 +82,12 @@ class ScatteredOrders:
         scale = height_scale * densest
         reach = min(2.0 * longest, table.q_limit)
         self.mixture = order_mixture(table, scale, reach, smoothing)
-        total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         # light that interferes goes with its root
         least = LEAST_WEAK if self.mixture.beats is None else LEAST_WEAK**2
-        self.has_weak = bool(total > least)
+        self.has_weak = self.mixture.weak > least
         self.strong = len(self.mixture.frequency)
         self.nodes, self._directions = quadrature(rings, steps), (rings, steps)
+        self.distance = 0.5 * math.pi / rings
         count = len(self.mixture.central)
         self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
         nodes = self.mixture.kappa_step * np.arange(count, dtype=np.float64)
@@ -99,6 +101,15 @@ class ScatteredOrders:
     def nodes_within(self, critical_sine: float) -> Quadrature:
         """Return directions on both sides of a critical angle."""
         return quadrature(*self._directions, critical_sine)
+
+    def incidence(self, grid: DirectionGrid, k: float) -> DirectionGrid:
+        """Return a grid with azimuths close enough for the weak orders' light of wavenumber k.
+
+        Where lobes are apart, light appears and vanishes over the width of one.
+        """
+        wanted = 2.0 * math.pi * k / self.mixture.lobe
+        finer = math.ceil(math.log2(max(wanted / grid.azimuthal, 1.0)))
+        return DirectionGrid(grid.polar, grid.azimuthal * 2 ** min(finer, _MOST_HALVED))
 
     def order_0(self, kappa: Real) -> Real:
         """Return the power of order 0 at κ over the height scale and `densest`."""
@@ -136,8 +147,9 @@ class Transport:
         self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
         self._parts: list[Callable[[Single], Single]] = [self._order_0(theta, phi, grid)]
         if orders.has_weak:
-            here = grid.half.interpolation(theta[:, None], phi)
-            weak = self._weak(grid.half, grid)
+            seen_from = orders.incidence(grid.half, self._k)
+            here = seen_from.interpolation(theta[:, None], phi)
+            weak = self._weak(seen_from, grid)
             self._parts.append(lambda s: here(weak(s)))
         if orders.strong:
             self._parts.append(self._strong(theta, phi, grid))
@@ -157,7 +169,7 @@ class Transport:
 
     def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the light of order 0."""
-        if self._width_0 > _WIDE:
+        if self._width_0 > _WIDE * self._orders.distance:
             return self._order_0_everywhere(theta, phi, grid)
         shares = self._order_0_shares(theta, grid)
         mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
@@ -257,13 +269,12 @@ class Transport:
         cos_i, sine = self._start(theta[:, None])
         rows_of = np.arange(len(theta))[:, None]
         gain = self._gain(cos_i[:, 0], rows_of, nodes.cosine, nodes.azimuth)
-        densities = [(mixture.density, gain)]
+        kappa = self._kappa(cos_i, nodes.cosine)
+        densities = [(mixture.density, gain * kappa**2)]
         if mixture.beats is not None:
             zeroth, _ = self._mirrored(cos_i, nodes.cosine, np.cos(nodes.azimuth))
             densities.append((mixture.beats, np.sqrt(gain * zeroth)))
-        position = np.minimum(
-            self._kappa(cos_i, nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001
-        )
+        position = np.minimum(kappa / mixture.kappa_step, len(mixture.density) - 1.001)
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
         scale = self._path.sign * k / mixture.pitch

@@ -82,25 +82,48 @@ def test_a_flat_surface_reflects_what_fresnel_says():
             assert raw_albedo(table, theta, 0.0, 550, material) == pytest.approx(exact, rel=4e-3)
 
 
+def integral(table, theta, phi, wavelength):
+    """Albedo of a perfect mirror by midpoints, close together where light grazes the surface."""
+    count = 96
+    cosine = ((np.arange(count) + 0.5) / count) ** 2
+    cosine, turn = np.meshgrid(cosine, (np.arange(2 * count) + 0.5) * (np.pi / count))
+    sine = np.sqrt(1.0 - cosine**2)
+    wo = np.stack([sine * np.cos(turn), sine * np.sin(turn), cosine], axis=-1)
+    weights = cosine**1.5 * (2 * np.pi / count**2)  # dωo cosθo
+    return (table.brdf(polar(theta, phi), wo.reshape(-1, 3), wavelength) * weights.ravel()).sum()
+
+
+def integrals_and_sums(table, angles, azimuths, wavelength):
+    found, _ = SurfaceEnergy(table, reflector("kirchhoff", None)).albedos(
+        Conservation(), np.radians(angles), np.radians(azimuths), wavelength
+    )
+    exact = [[integral(table, theta, phi, wavelength) for phi in azimuths] for theta in angles]
+    return np.array(exact), found[0]
+
+
 @pytest.mark.parametrize("coherence", ["ensemble", "patch"])
 def test_an_albedo_under_a_narrow_window_is_the_integral_of_the_model(coherence):
     """Few orders with lobes of some degrees: neither single directions nor a smooth density."""
     patch = rough_patch((40, 40), (0.2, 0.2), 0.12, 1.2)
     light = {"wavelength_range": (540.0, 560.0)}  # few orders: seconds less
     table = md.DiffractionTable.build(patch, coherence_width=8.0, coherence=coherence, **light)
-    angles, step = np.array([45.0, 75.0]), np.pi / 192
-    found, _ = SurfaceEnergy(table, reflector("kirchhoff", None)).albedos(
-        Conservation(), np.radians(angles), np.radians([20.0]), 550.0
-    )
-    theta, phi = np.meshgrid((np.arange(96) + 0.5) * step, (np.arange(96) + 0.5) * (4 * step))
-    wo = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-    weights = np.sin(theta) * np.cos(theta) * 4 * step**2
-    exact = [
-        (table.brdf(polar(angle, 20.0), wo.reshape(-1, 3), 550.0) * weights.ravel()).sum()
-        for angle in angles
-    ]
+    exact, found = integrals_and_sums(table, [45.0, 75.0], [20.0], 550.0)
     # the quadrature has rings 2.5° apart, and reads the nearest samples of the density
-    assert found[0, :, 0] == pytest.approx(exact, abs=0.02)
+    np.testing.assert_allclose(found, exact, atol=0.02)
+
+
+def test_few_wide_orders_leave_at_the_azimuths_and_grazing_angles_of_the_model():
+    """Orders 30° apart with lobes of 3°: each azimuth of incidence sees others."""
+    columns = np.random.default_rng(3).random((10, 7))
+    heights, light = 0.08 * np.kron(columns, np.ones((3, 2))), (430.0, 440.0)
+    patch = md.HeightField(heights, (0.055, 0.077), periodic=True)
+    table = md.DiffractionTable.build(patch, coherence_width=3.3, wavelength_range=light)
+    angles, azimuths = [70.0, 80.0, 86.0, 88.5], [16.0, 45.0, 80.0]
+    exact, found = integrals_and_sums(table, angles, azimuths, 435.0)
+    # samples of the density, a quarter of a lobe's deviation apart
+    np.testing.assert_allclose(found[:3], exact[:3], rtol=0.01)
+    # between angles of the grid light grows as 1/cosθ
+    np.testing.assert_allclose(found[3], exact[3], rtol=0.05)
 
 
 @pytest.mark.parametrize("surface", ["grating", "rough"])
