@@ -5,6 +5,7 @@ The roughness of the heights decides the share of small slope's matrix in N (`op
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +16,7 @@ from ...arrays import Real
 from ...optics.blend import RoughnessTable
 from ...optics.boundary import Heights, model_of
 from ...optics.fresnel import Filmed
-from ...optics.paths import Path
+from ...optics.paths import Path, Side
 
 #: Polar angles of both directions, and azimuths between them, of tables of G.
 POLAR, AZIMUTHS = 37, 25
@@ -55,10 +56,10 @@ class PathGain:
         if self.path.index is None:
             return common
         polar = len(self._table)
-        lower, share = _cell(_polar_place(cos_i) * (polar - 1), polar)
+        lower, share = _cell(_polar_place(cos_i, self.path.came) * (polar - 1), polar)
         share = share[:, None, None]
         pages = (self._table[lower] * (1.0 - share) + self._table[lower + 1] * share).ravel()
-        i, s = _cell(_polar_place(cos_o) * (polar - 1), polar)
+        i, s = _cell(_polar_place(cos_o, self.path.left) * (polar - 1), polar)
         j, t = _cell(np.arccos(cos_turn) * ((AZIMUTHS - 1) / np.pi), AZIMUTHS)
         at = (row * polar + i) * AZIMUTHS + j
         near, far = (
@@ -78,19 +79,20 @@ class PathGain:
 
     @cached_property
     def _table(self) -> Real:
-        """G over `Path.common` at `_nodes`, (polar, polar, AZIMUTHS).
+        """G over `Path.common` at `_cosines`, (polar, polar, AZIMUTHS).
 
         Finer of a thick film, and where facets reflect totally from some angle on, with a kink.
         """
         index = self.path.index
         fine = thick(index) or (isinstance(index, float) and index < 1.0)
         polar = 2 * POLAR - 1 if fine else POLAR
-        cosine, cos_turn = _nodes(polar)
+        cos_i, cos_o = (_cosines(side, polar) for side in (self.path.came, self.path.left))
+        cos_turn = np.cos(np.linspace(0.0, np.pi, AZIMUTHS))
         if self.path.came != self.path.left:
-            return self._ratio(cosine[:, None, None], cosine[:, None], cos_turn)
+            return self._ratio(cos_i[:, None, None], cos_o[:, None], cos_turn)
         i, o = np.triu_indices(polar)  # G is symmetric
         table = np.empty((polar, polar, AZIMUTHS))
-        table[i, o] = table[o, i] = self._ratio(cosine[i, None], cosine[o, None], cos_turn)
+        table[i, o] = table[o, i] = self._ratio(cos_i[i, None], cos_o[o, None], cos_turn)
         return table
 
     def _ratio(self, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
@@ -109,9 +111,29 @@ class PathGain:
         return np.asarray(ratio * path.power(cos_i, cos_o, cos_turn, heights))
 
 
-def _polar_place(cosine: Real) -> Real:
-    """Return the place, 0 to 1, of cosθ among `_nodes`."""
-    return np.asarray(1.0 - np.sqrt(1.0 - np.arccos(np.minimum(cosine, 1.0)) * (2.0 / np.pi)))
+def _polar_place(cosine: Real, side: Side) -> Real:
+    """Return the place, 0 to 1, of cosθ among `_cosines`."""
+    angle, critical = np.arccos(np.minimum(cosine, 1.0)), math.asin(side.critical_sine)
+    if side.critical_sine == 1.0:
+        return np.asarray(1.0 - np.sqrt(1.0 - angle / critical))
+    within = 0.5 - 0.5 * np.sqrt(np.maximum(1.0 - angle / critical, 0.0))
+    beyond = np.maximum(angle - critical, 0.0) / (0.5 * np.pi - critical)
+    return np.asarray(within + np.arcsin(np.sqrt(np.minimum(beyond, 1.0))) / np.pi)
+
+
+def _cosines(side: Side, polar: int) -> Real:
+    """Return cosines of θ of a side at which G is tabulated.
+
+    Denser towards grazing, and towards a critical angle: G has the slope of a root there.
+    """
+    place, critical = np.linspace(0.0, 1.0, polar), math.asin(side.critical_sine)
+    if side.critical_sine == 1.0:
+        angle = critical * (1.0 - (1.0 - place) ** 2)
+    else:
+        within = critical * (1.0 - (1.0 - 2.0 * np.minimum(place, 0.5)) ** 2)
+        beyond = np.sin(np.pi * np.maximum(place - 0.5, 0.0)) ** 2
+        angle = within + (0.5 * np.pi - critical) * beyond
+    return np.maximum(np.cos(angle), LEAST_COSINE)
 
 
 def _cell(place: Real, count: int) -> tuple[NDArray[np.int32], Real]:
@@ -123,10 +145,3 @@ def _cell(place: Real, count: int) -> tuple[NDArray[np.int32], Real]:
 def thick(index: object) -> bool:
     """Whether fringes of a film vary quickly with the angle."""
     return isinstance(index, Filmed) and index.advance > THICK
-
-
-def _nodes(polar: int) -> tuple[Real, Real]:
-    """Return cosines of θi or θo, and of the azimuth between, at which G is tabulated."""
-    angle = 0.5 * np.pi * (1.0 - np.linspace(1.0, 0.0, polar) ** 2)  # denser towards grazing
-    cosine = np.maximum(np.cos(angle), LEAST_COSINE)
-    return cosine, np.cos(np.linspace(0.0, np.pi, AZIMUTHS))

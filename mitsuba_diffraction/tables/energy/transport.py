@@ -44,6 +44,9 @@ LEAST_WEAK = 2e-3
 #: Width of order 0's lobe, in distances between rings, above which all directions are summed over:
 #: G differs from one azimuth to another, by 0.01 under 4 µm. The quadrature resolves such lobes.
 _WIDE = 1.15
+#: Index above which wide lobes get a finer quadrature: they are narrow within such a dielectric.
+#: Light from within at 84° was 0.01 short of the model's at 2.46, and is 0.002 short.
+_DENSE = 2.0
 #: Pairs of a direction and an order, or another direction, that are looked at together.
 _PAIRS = 1 << 16
 #: How often distances between azimuths of incidence are halved, at most.
@@ -75,6 +78,8 @@ class ScatteredOrders:
         # window of 4 µm on an index of 2.46 sums were 0.08 off without, and are 0.004 to 0.02
         smoothing = SMOOTHING * longest * math.sqrt(densest) * 0.5 * math.pi / settings.rings
         lobe = 1.0 / (math.sqrt(2.0) * table.sigma)
+        if densest > _DENSE and lobe > NARROW * smoothing:
+            finer = max(finer, 2)
         if table.grid.overlapping and lobe >= NARROW * smoothing:  # which smoothing would widen
             finer = max(finer, math.ceil(smoothing / lobe))
         rings, steps, smoothing = finer * settings.rings, finer * settings.steps, smoothing / finer

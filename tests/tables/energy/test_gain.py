@@ -50,3 +50,19 @@ def test_tables_hold_the_boundary_s_gain_in_either_order_of_directions(path):
     error = np.abs(tabulated - expected)[away].sum() / expected[away].sum()
     # 1.2 % where total reflection begins at a kink, 1.6 % within with 37 × 37 × 25 nodes
     assert error < 0.014
+
+
+@pytest.mark.parametrize("index", [1.5, 2.46])
+def test_tables_hold_the_root_at_a_critical_angle(index):
+    """Light let through towards directions within 3° of it on either side."""
+    patch = rough_patch((40, 44), (0.09, 0.09), 0.1)
+    exact = ScaleRoughness.from_heights(patch.heights, patch.pixel_size)
+    path = Transmitter(index, "small_slope", False).paths(np.array([550.0]), 0.05)[0][1]
+    gain = PathGain(path, exact.table(50.0), 11.0, 1.0)
+    critical = np.arcsin(1.0 / index)
+    cos_o = np.cos(np.linspace(critical - 0.05, critical + 0.05, 41))
+    cos_i, row = np.array([np.cos(1.1)]), np.zeros(41, int)
+    expected = gain.exact(cos_i, cos_o, np.full(41, -0.95))
+    tabulated = gain(cos_i, row, cos_o, np.full(41, np.arccos(-0.95)))
+    # up to 0.11 where nodes were the same for all sides
+    np.testing.assert_allclose(tabulated, expected, rtol=0.02)
