@@ -19,7 +19,7 @@ COARSE = EnergySettings(
     side_parts=(1, 1),
     fringes=12,
     rings=16,
-    steps=24,
+    steps=36,
     sweeps=6,
     passes=2,
 )
