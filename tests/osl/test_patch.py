@@ -152,7 +152,9 @@ def test_a_small_scan_limits_the_window_of_orders_and_not_the_mirror_s(tmp_path,
         (SMALL_SCAN, "4.8"),
         (SMALL_SCAN.treated(periodic="exact"), "1000000000.0"),
     ):
-        exported = md.osl.export(mi.load_dict(md.bsdf_dict(field, energy_conserving=False)), tmp_path)
+        exported = md.osl.export(
+            mi.load_dict(md.bsdf_dict(field, energy_conserving=False)), tmp_path
+        )
         document = json.loads(exported.document.read_text(encoding="utf-8"))
         values = {item["identifier"]: item["default"] for item in document["inputs"]}
         assert values["CoherenceWidth"] == 65.0
