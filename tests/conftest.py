@@ -25,10 +25,12 @@ from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energ
 from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.coarse import coarse_energy
 from tests.support.command_line import Ran
-from tests.support.kernels import Called, called_objects, compile_quickly
+from tests.support.kernels import Called, called_objects, compile_quickly, transform_once
 from tests.support.variants import SOME, VARIANTS, obstacle, runs
 
 pytest_plugins = ["tests.support.processor_time"]
+
+transform_once()  # before Mitsuba is imported
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -90,6 +92,14 @@ def same_cases_in_every_run() -> None:
     module = "hypothesis.internal.conjecture.providers"
     if hasattr(sys.modules.get(module), "is_local_module_file"):
         sys.modules[module].is_local_module_file = lambda file: False  # type: ignore[attr-defined]
+
+
+def pytest_collection_finish() -> None:
+    """Exempt what is imported by now from collections of garbage: they take a tenth of the time."""
+    import mitsuba  # noqa: F401
+
+    gc.collect()
+    gc.freeze()
 
 
 _left: set[Called] = set()

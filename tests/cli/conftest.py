@@ -1,48 +1,14 @@
-"""Running the command line in this process, and in a child where the process state matters."""
+"""Inputs of commands, and folders that they run in."""
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.support import ROOT
-from tests.support.command_line import Ran
 from tests.support.inputs import write_inputs
-
-
-@pytest.fixture
-def child(tmp_path: Path) -> Callable[..., Ran]:
-    """`child(arguments, prelude="", limit=None)`: main() in a child whose folder is `tmp_path`.
-
-    `prelude` is Python code that runs first, with `main` imported; `limit` the largest file that
-    the child can write, in bytes: what a full disk is like without one.
-    """
-
-    def call(arguments: Sequence[object], prelude: str = "", limit: int | None = None) -> Ran:
-        lines = ["import os, signal, sys", "from mitsuba_diffraction.cli import main"]
-        if limit is not None:
-            lines.append("from resource import RLIMIT_FSIZE, setrlimit")
-            lines.append(f"setrlimit(RLIMIT_FSIZE, ({limit}, {limit}))")
-        lines += [prelude, "sys.exit(main(sys.argv[1:]))"]
-        result = subprocess.run(
-            [sys.executable, "-c", "\n".join(lines), *map(str, arguments)],
-            cwd=tmp_path,
-            # no .pyc: a limit on file sizes would leave half of one
-            env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"},
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
-        return Ran(result.returncode, result.stdout, result.stderr)
-
-    return call
 
 
 @pytest.fixture

@@ -113,7 +113,7 @@ def test_materials_reflect_less(run, heights):
 
 def test_a_preset_stands_in_for_the_source(run, here):
     ran = run(
-        "brdf-map", "--preset", "dvd", "--resolution", "32", "--step", "47", "--json", "a.json"
+        "brdf-map", "--preset", "dvd", "--resolution", "8", "--step", "235", "--json", "a.json"
     )
     assert ran.code == 0, ran.err
     assert sorted(os.listdir(here)) == ["a.json", "dvd-map.exr", "dvd-map.png"]

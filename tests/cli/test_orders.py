@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -74,8 +75,10 @@ def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
 
 def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # a process takes a second to start
+    monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
     grating = ("--period", 0.3, "--depth", 0.01, "--material", 1.5, "--wavelength-range", "540:560")
-    settings = ("--tolerance", 0.2, "--resolution", 4, "-o", "block.nc")
+    settings = ("--tolerance", 0.2, "--resolution", 3, "-o", "block.nc")
     ran = run("solve", "lamellar", *grating, "--block", *settings)
     assert ran.code == 0, ran.err
     assert "index 1.5" in ran.out

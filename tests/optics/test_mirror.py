@@ -24,7 +24,7 @@ INDICES |= {"glass": 1.5, "water": 1.33, "diamond": 2.42}
 
 def albedo(sharp: float, degrees: float, index: complex | None) -> float:
     """∫ f₀ cosθo dωo of a flat mirror under a window of this kσ₀, by quadrature over the lobe."""
-    theta, nodes, reach = np.radians(degrees), 400, 5.0 / sharp
+    theta, nodes, reach = np.radians(degrees), 200, 5.0 / sharp
     sine = np.sin(theta)
     first = np.sqrt(1.0 - min(sine + reach, 1.0) ** 2)
     last = np.sqrt(1.0 - max(sine - reach, 0.0) ** 2)

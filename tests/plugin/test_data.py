@@ -59,11 +59,11 @@ def test_albedo_and_pictures_follow_heights(variant):
     def picture(bsdf: Any) -> Array:
         plate = {"type": "rectangle", "bsdf": bsdf}
         scene = {"type": "scene", "plate": plate, "light": {"type": "constant"}}
-        film = {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}}
+        film = {"type": "hdrfilm", "width": 2, "height": 2, "rfilter": {"type": "box"}}
         to = mi.ScalarTransform4f().look_at([0, 1, 2], [0, 0, 0], [0, 1, 0])
         scene["camera"] = {"type": "perspective", "to_world": to, "fov": 10, "film": film}
         scene["integrator"] = {"type": "direct"}
-        return np.array(mi.render(mi.load_dict(scene), spp=16, seed=1))
+        return np.array(mi.render(mi.load_dict(scene), spp=4, seed=1))
 
     conserving = {"material": "Al", "energy_conserving": True, "tolerance": 1e-3}
     bsdf = load(**conserving)

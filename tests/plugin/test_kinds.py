@@ -5,6 +5,7 @@ test_kinds_thorough.py asks more of each, and of more kinds.
 
 from __future__ import annotations
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -67,9 +68,12 @@ def test_directions_and_samples_are_taken_as_lists(variant, kind):
     si.wi = mi.Vector3f(0.0, 0.0, 1.0)
     si.sh_frame = mi.Frame3f(mi.Normal3f(0.0, 0.0, 1.0))
     ctx, wo, pair = mi.BSDFContext(), [0.1, 0.0, 0.995], [0.3, 0.4]
-    for name in ("eval", "pdf", "eval_pdf"):
-        function = getattr(bsdf, name)
-        assert str(function(ctx, si, wo)) == str(function(ctx, si, mi.Vector3f(wo)))
-    drawn, weight = bsdf.sample(ctx, si, 0.5, pair)
-    again, expected = bsdf.sample(ctx, si, mi.Float(0.5), mi.Point2f(pair))
-    assert (str(drawn.wo), str(weight)) == (str(again.wo), str(expected))
+    functions = bsdf.eval, bsdf.pdf, bsdf.eval_pdf
+    lists, arrays = (
+        [[f(ctx, si, direction) for f in functions], bsdf.sample(ctx, si, one, two)]
+        for direction, one, two in (
+            (wo, 0.5, pair), (mi.Vector3f(wo), mi.Float(0.5), mi.Point2f(pair)),
+        )
+    )  # fmt: skip
+    dr.eval(lists, arrays)  # one kernel
+    assert str(lists) == str(arrays)

@@ -38,6 +38,7 @@ def test_halves_are_read_as_stored(some_variant: str, numbers: int) -> None:
     places = generator.permutation(50)
     halves = HalfFloats(stored)
     packets = halves.read(mi.UInt32(places))
+    dr.eval(packets)  # one kernel
     read = np.stack([np.array(x) for packet in packets for x in packet], axis=1) * halves.scale
     expected = np.where(np.abs(stored) < NORMAL, np.float16(0), stored)[places]
     np.testing.assert_array_equal(read[:, :numbers], expected)

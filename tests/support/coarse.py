@@ -10,11 +10,11 @@ from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energ
 
 #: Energy conserved for who does not ask how well.
 COARSE = EnergySettings(
-    polar=24,
-    azimuthal=24,
+    polar=16,
+    azimuthal=16,
     wavelengths=3,
-    side_polar=40,
-    side_wavelengths=3,
+    side_polar=24,
+    side_wavelengths=2,
     parts=(1, 1),
     side_parts=(1, 1),
     fringes=12,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,7 @@ def listed(theta, phi, wavelengths, of_order=efficiency):
     return Efficiencies(np.asarray(wavelengths), theta, phi, pairs.T, values)
 
 
+@functools.cache
 def table() -> OrderTable:
     """Its table."""
     grid = listed(np.arange(0.0, 86.0, 5.0), np.arange(0.0, 360.0, 15.0), np.arange(450, 651, 20.0))
@@ -58,6 +60,7 @@ def table() -> OrderTable:
     return imported_table(grid, PERIODS, 1.0, "the closed form", header)
 
 
+@functools.cache
 def clear_table() -> OrderTable:
     """Table of a clear material, `clear_efficiency`."""
     grid = listed(

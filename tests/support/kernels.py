@@ -9,7 +9,10 @@ from __future__ import annotations
 import ctypes
 import functools
 import os
+import types
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from mitsuba_diffraction.llvm import VARIABLE as LIBRARY
 
@@ -61,6 +64,29 @@ def vectors_of(lanes: int) -> int:
     before = int(width())
     set_target(*(ctypes.c_char_p(text()) for text in described), ctypes.c_uint32(lanes))
     return before
+
+
+def transform_once() -> None:
+    """Let `@dr.syntax` transform a function once, in this process from now on.
+
+    Each change of variant loads Mitsuba's integrators again, and most of its time is that of their
+    transformation, which depends on their code alone.
+    """
+    import drjit as dr
+
+    transform, codes = dr.syntax, {}
+
+    def syntax(function: Any = None, **options: bool) -> Callable:
+        if function is None:
+            return functools.partial(syntax, **options)
+        key = function.__module__, function.__code__, *options.items()
+        if key not in codes:
+            codes[key] = transform(function, **options).__code__
+        made = types.FunctionType(codes[key], function.__globals__)
+        made.__defaults__ = function.__defaults__
+        return made
+
+    dr.syntax = syntax
 
 
 #: Kinds of Mitsuba's objects that kernels call.

@@ -68,6 +68,7 @@ def thin_grating(
     return OrderTable((period, np.inf), wavelengths, CellResponse(bands), superstrate, header, thin)
 
 
+@functools.cache
 def listed_grating() -> OrderTable:
     """`thin_grating` in light from -20, 0 and 20° alone."""
     wavelengths, theta, orders = (

@@ -44,12 +44,16 @@ def table(request):
     )
 
 
+@pytest.fixture(scope="module")
+def whole():
+    return DiffractionTable.build(PATCH, coherence_width=1.8)
+
+
 @pytest.fixture
-def saved(tmp_path):
+def saved(whole, tmp_path):
     """A file with a table, to be damaged."""
-    file = tmp_path / "table.exr"
-    DiffractionTable.build(PATCH, coherence_width=1.8).save(file)
-    return file
+    whole.save(tmp_path / "table.exr")
+    return tmp_path / "table.exr"
 
 
 def refused(file):

@@ -61,7 +61,7 @@ def test_five_nanometres_are_ninety_four_bands():
 
 @pytest.mark.usefixtures("variant")
 def test_exposure_shows_what_lies_around_the_mirror_direction():
-    result = brdf_map(plugin(GRATING), 20.0, step=47, resolution=128)
+    result = brdf_map(plugin(GRATING, coherence_width=20.0), 20.0, step=47, resolution=128)
     stops = result.exposure()
     shown = np.sort((result.luminance * 2.0**stops)[result.away_from_mirror()].astype(float))
     below_white = shown[shown < 1.0].sum() / shown.sum()

@@ -83,8 +83,8 @@ def test_alpha_is_straight_in_the_png(run, scene):
     assert np.abs(shown[edge][:, :3].astype(float) - 137).max() < 25
 
 
-def test_the_default_variant_is_spectral(child, scene):
-    ran = child(["render", scene, "-s", "1"])
+def test_the_default_variant_is_spectral(run, scene):
+    ran = run("render", scene, "-s", "1")
     assert ran.code == 0, ran.err
     assert "_ad_spectral" in ran.out
 

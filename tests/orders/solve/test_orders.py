@@ -32,7 +32,7 @@ pytest.importorskip("gratinglab")
 PROFILE = sinusoidal(0.5, 0.05)
 LOOP = np.array([[0, 0.8, 0.5, 0.5], [0, 0.5, -0.5, 1.0]])
 SPIKE = np.array([[0, 0.4, 0.4, 0.4, 0.9], [0, 0, 0.1, 0, 0]])
-SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.05, polarised=True)
+SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.1, polarised=True)
 
 
 @pytest.fixture(scope="module")
@@ -48,9 +48,8 @@ def table(announced):
 
 
 def test_the_measured_error_is_within_the_tolerance(table):
-    assert table.header["error_mean"] <= SETTINGS.tolerance
-    assert table.header["error_polarised"] <= SETTINGS.tolerance
-    assert table.header["reciprocity_error"] <= SETTINGS.tolerance
+    for name in ("error_mean", "error_polarised", "reciprocity_error"):
+        assert table.header[name] <= 0.5 * SETTINGS.tolerance
 
 
 def test_a_solution_that_no_longer_changes_has_the_error_of_single_precision():
@@ -62,7 +61,7 @@ def test_a_solution_that_no_longer_changes_has_the_error_of_single_precision():
 def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
     for x, y, lam in ((0.1, 0.2, 540.0), (-0.6, 0.3, 600.0), (0.0, 0.8, 630.0)):
         total = sum(float(table.efficiency(x, y, lam, m)) for m in range(-3, 4))
-        # interpolation, beside the tolerance of 5 % of the orders
+        # interpolation, beside the tolerance of 10 % of the orders
         assert total == pytest.approx(1, abs=0.02)
 
 
@@ -95,7 +94,7 @@ def test_the_error_compares_with_new_solutions(table):
     perfect = material_of("none", SETTINGS.wavelengths)
     problem = problem_of(Grating(PROFILE, perfect, 1.0, SETTINGS.wavelengths), "integral", 64)
     # within the tolerance of the nodes and that of the solver
-    assert measured_error(table, problem, Jobs()).mean < 1.5 * SETTINGS.tolerance
+    assert measured_error(table, problem, Jobs()).mean < 0.75 * SETTINGS.tolerance
 
 
 @pytest.mark.parametrize(
@@ -144,7 +143,7 @@ def test_a_ridge_that_leans_over_the_next_period_is_moved():
 def test_a_table_that_misses_its_tolerance_is_refined_and_then_warned_of(monkeypatch):
     monkeypatch.setattr(orders, "REFINEMENTS", 0)
     monkeypatch.setattr(node_counts, "_count", lambda *_: (orders.Counts(2, 2, 1), 0.0))
-    exact = replace(SETTINGS, tolerance=1e-3)
+    exact = replace(SETTINGS, tolerance=1e-3, resolution=16)
     with pytest.warns(md.DiffractionWarning, match=r"5 % of directions .tolerance 0.40%"):
         coarse = solve_orders(PROFILE, "none", settings=exact)
     monkeypatch.setattr(orders, "REFINEMENTS", 1)

@@ -117,7 +117,7 @@ def test_a_sheet_keeps_all_light_and_sends_it_back_as_it_came(profile):
 
 
 def test_a_sheet_is_solved_into_a_table():
-    settings = Settings((560.0, 640.0), tolerance=0.1, method="coupled", resolution=4)
+    settings = Settings((560.0, 640.0), tolerance=0.2, method="coupled", resolution=4)
     table = solve_orders(lamellar(0.5, 0.05), INDEX, thin=True, settings=settings)
     assert table.thin
     assert table.header["energy_error"] < 1e-5
@@ -129,7 +129,7 @@ def test_a_sheet_is_solved_into_a_table():
             for m in range(-2, 3)
             for transmitted in (False, True)
         ]
-        # interpolation, beside the tolerance of 10 % of the orders
+        # interpolation, beside the tolerance of 20 % of the orders
         assert np.sum(sums, axis=0) == pytest.approx(1.0, abs=0.01)
 
 

@@ -19,7 +19,7 @@ pytestmark = [
 
 FIELDS = {
     "flat": md.HeightField(np.zeros((8, 8)), 8.0),
-    "50 nm": rough_patch((80, 80), (0.1, 0.1), 0.05, 1.0),
+    "50 nm": rough_patch((48, 48), (0.1, 0.1), 0.05, 1.0),
     "5 nm": rough_patch((200, 200), (0.1, 0.1), 0.005, 1.0),
 }
 #: From above and from below.

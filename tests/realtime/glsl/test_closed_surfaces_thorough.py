@@ -58,7 +58,7 @@ def scene_of_balls(folder: Path) -> dict[str, Any]:
         for n, bsdf in enumerate(shown)
     }  # fmt: skip
     view = T().look_at([0.0, -20.0, 60.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    film = {"type": "hdrfilm", "width": 120, "height": 120}
+    film = {"type": "hdrfilm", "width": 96, "height": 96}
     light = {
         "type": "rectangle", "emitter": {"type": "area", "radiance": 20.0},
         "to_world": T().look_at([10.0, 0.0, 20.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]),

@@ -22,7 +22,7 @@ WIDTH = 12.0
 
 @pytest.fixture(scope="module")
 def scan():
-    return HeightField(rough(), PIXEL, name="scan", cut_out=True)
+    return HeightField(rough(360), PIXEL, name="scan", cut_out=True)
 
 
 @pytest.fixture(scope="module")

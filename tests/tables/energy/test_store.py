@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -36,11 +37,16 @@ def computed(monkeypatch, tmp_path):
     return made
 
 
-def energy(index: complex = 1.5, scale: float = 1.5) -> Energy:
+@functools.cache
+def table(scale: float) -> md.DiffractionTable:
     field = md.gratings.sinusoidal(2.0, 0.1, periods=2, pixels_per_period=24)
-    table = md.DiffractionTable.build(field, coherence_width=4.0, height_scale_max=scale)
+    return md.DiffractionTable.build(field, coherence_width=4.0, height_scale_max=scale)
+
+
+def energy(index: complex = 1.5, scale: float = 1.5) -> Energy:
+    """Of a table without what others keep for the next material."""
     material = Reflector("small_slope", lambda w: np.full(len(w), index))
-    return Energy(table, material, (400.0, 700.0))
+    return Energy(replace(table(scale)), material, (400.0, 700.0))
 
 
 @pytest.mark.parametrize("most", [1.5, 1.43, 0.1])

@@ -41,7 +41,7 @@ def gentle() -> HeightField:
 
 def steps() -> HeightField:
     """Noise of 0.3 µm in squares of 1 µm: vertical walls."""
-    noise = np.random.default_rng(2).random((20, 20)) * 0.3
+    noise = np.random.default_rng(2).random((12, 12)) * 0.3
     return HeightField(np.kron(noise, np.ones((10, 10))), 0.1)
 
 
@@ -100,7 +100,7 @@ def test_a_gentle_sheet_sends_on_nearly_all_light():
 def test_steps_send_on_no_more_than_they_get():
     """Without a scale walls 0.3 µm high send on up to 1.05."""
     use_energy_settings(EnergySettings(side_wavelengths=2, azimuthal=40))
-    table = DiffractionTable.build(steps(), coherence_width=20.0, height_scale_max=2.4)
+    table = DiffractionTable.build(steps(), coherence_width=12.0, height_scale_max=2.4)
     surface = SurfaceEnergy(table, Transmitter(2.4, "small_slope", False))
     scales, angles = surface.conservation((540.0, 540.0)), np.radians(np.arange(1.0, 80.0, 6.0))
     raw, kept = surface.albedos(scales, angles, np.radians(np.arange(4.0, 360.0, 37.0)), 540.0)
