@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from ...arrays import Real, Single
 
@@ -68,6 +69,10 @@ def _largest_around(factors: Single, azimuthal: int) -> Single:
 
 
 def parallel(function: Callable[[Any], Any], arguments: Iterable[Any]) -> list[Any]:
-    """Return results for all arguments, by as many threads as there are processors."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    """Return results for all arguments, by as many threads as there are processors.
+
+    Products of matrices have one thread each: each would start as many again, which wait for one
+    another in the processor. Scales of a window of 0.5 µm took 3.4 times the processor time.
+    """
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(function, arguments))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.scaling import scaled
+from mitsuba_diffraction.tables.energy.scaling import parallel, scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.directions import polar, rough_patch
 from tests.support.furnace import isotropic
@@ -192,3 +193,12 @@ def test_sums_below_zero_leave_the_scale_a_number():
     scale = scaled(lambda s: kernel @ s, aim, 2.0, 8)
     assert np.all(np.isfinite(scale))
     assert scale[1] * (kernel @ scale)[1] == pytest.approx(1.0, rel=0.05)
+
+
+def test_threads_start_no_threads_of_their_own():
+    def most(_: int = 0) -> int:
+        return max(library["num_threads"] for library in threadpool_info())
+
+    with threadpool_limits(2, "blas"):
+        assert parallel(most, range(3)) == [1, 1, 1]
+        assert most() == 2
