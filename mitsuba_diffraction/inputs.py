@@ -22,6 +22,7 @@ class _Noted:
         self.read: dict[tuple[int, int], str] = {}
         self.paths: dict[str, str] = {}
         self.written: set[str] = set()
+        self.folders: set[str] = set()
 
 
 _noted: _Noted | None = None
@@ -47,6 +48,12 @@ def note_input(path: str | os.PathLike[str]) -> None:
         if stat.S_ISREG(status.st_mode) and place not in _noted.written:
             _noted.read[status.st_dev, status.st_ino] = place
             _noted.paths.setdefault(place, os.fspath(path))
+
+
+def note_folder(path: str | os.PathLike[str]) -> None:
+    """Note that the command reads every file of a folder."""
+    if _noted is not None:
+        _noted.folders.add(os.path.realpath(path))
 
 
 def note_output(path: str | os.PathLike[str]) -> None:
@@ -77,4 +84,17 @@ def refuse_input(output: str | os.PathLike[str]) -> None:
         raise DiffractionError(
             f"'{output}' would overwrite '{source}', which this command reads; choose another name "
             "for the output"
+        )
+
+
+def refuse_in_folder(output: str | os.PathLike[str]) -> None:
+    """Raise a DiffractionError if an output lies in a folder of which all files are read.
+
+    The next run would read it as well.
+    """
+    folder = os.path.dirname(os.path.realpath(output))
+    if _noted is not None and folder in _noted.folders:
+        raise DiffractionError(
+            f"'{output}' lies in a folder of which this command reads every file, so that the next "
+            "run would read it; choose another folder for the output"
         )

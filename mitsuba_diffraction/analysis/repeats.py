@@ -13,6 +13,7 @@ import numpy as np
 
 from ..columns import save_rows
 from ..errors import DiffractionError
+from ..inputs import note_folder
 from ..scene.parameters import note_files
 from .iridescence import HUES
 
@@ -38,7 +39,8 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
 
     Folders are not searched deeper; hidden files, and files of documents, are left out of them.
 
-    Raises a DiffractionError if a folder holds no file, or no file matches a pattern.
+    Raises a DiffractionError if a folder holds no file, no file matches a pattern, or no file
+    exists. One that is missing among others is listed: its reader says so.
     """
     files: dict[Path, None] = {}
     for name in names:
@@ -47,6 +49,7 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
             held = [f for f in shown if f.suffix.lower() not in _NO_SCANS]
             if not held:
                 raise DiffractionError(f"'{name}' holds no scans; name another folder")
+            note_folder(name)
         elif not name.exists() and glob.has_magic(str(name)):
             held = [Path(f) for f in sorted(glob.glob(str(name), recursive=True))]
             held = [f for f in held if f.is_file()]
@@ -55,6 +58,8 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
         else:
             held = [name]
         files |= dict.fromkeys(held)
+    if files and not any(file.exists() for file in files):
+        raise DiffractionError(f"'{next(iter(files))}' does not exist; check the path")
     for file in files:
         note_files(file)
     return list(files)

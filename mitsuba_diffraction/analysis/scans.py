@@ -6,11 +6,17 @@ import warnings
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from ..errors import DiffractionWarning
+from ..heights.field import HeightField
 from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables.source import TableSource
 from ..tables.table import DiffractionTable
+
+# Of a flat patch whose table takes no time: µm, and parameters.
+_PIXEL, _QUICK = 0.05, {"coherence_width": 1.0, "energy_conserving": False}
 
 
 def table_of(
@@ -25,6 +31,23 @@ def table_of(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         return source.table(settings, progress=progress)
+
+
+def check_surface(parameters: Mapping[str, Any]) -> None:
+    """Refuse parameters of a BSDF that no heights can have, before tables of any are built.
+
+    A flat patch shows whether they fit, in the current variant.
+
+    Raises a DiffractionError if one does not, or the pigment varies over a mesh.
+    """
+    from ..plugin.dictionary import bsdf_dict
+    from .known_wavelengths import known_range
+    from .media import medium_index
+
+    medium_index(parameters.get("ext_ior"))
+    known_range(parameters.get("material"), parameters.get("pigment"))
+    flat = HeightField(np.zeros((2, 2)), _PIXEL, periodic=True)
+    bsdf_of(bsdf_dict(flat, **{**parameters, **_QUICK}))
 
 
 def bsdf_of(values: Mapping[str, Any]) -> Any:

@@ -314,8 +314,9 @@ def _next(names: Sequence[str], done: int, client: Any) -> str:
 
 
 def files_in(folder: Path) -> list[Path]:
-    """List the files that a survey of any scans writes into its folder."""
-    return [folder / name for name in (TABLE, SAMPLES, f"{SHEET}.png", f"{SHEET}-001.png")]
+    """List the files that a survey of any scans writes into its folder, one of a scan's too."""
+    names = TABLE, SAMPLES, f"{SHEET}.png", f"{SHEET}-001.png", f"{SCANS}/scan.png"
+    return [folder / name for name in names]
 
 
 def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

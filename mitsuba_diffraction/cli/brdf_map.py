@@ -198,6 +198,7 @@ def _by_bsdf(
 ) -> tuple[Any, str, str]:
     """Map the renderer's BSDF; also return its surface and the variant in words."""
     from ..analysis.maps import brdf_map, check_variant
+    from ..analysis.scans import check_surface
 
     variant = set_variant(args.mode)
     check_variant(bands, args.illuminant, args.spectral)
@@ -205,6 +206,7 @@ def _by_bsdf(
     with mitsuba_warnings(), Bar(args) as bar:
         with warnings.catch_warnings():
             if notes:  # the plugin has them only when it builds the table
+                check_surface(surface_parameters(args))
                 say_warning(notes)
                 warnings.filterwarnings("ignore", r".*\bnotes? on '", DiffractionWarning)
             bsdf = surface_bsdf(args)

@@ -118,10 +118,13 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
     from ..thesis.methods.periods import check_period
     from ..thesis.period_fit import Beam
     from ..thesis.period_fit.ridge import check_axes
+    from ..thesis.period_fit.windows import MOST_WINDOWS
 
     beam = Beam(args.theta, args.phi or 0.0, medium_index(args.ext_ior))
     if args.period is not None:
         check_period(args.period)
+    if args.positions > MOST_WINDOWS:
+        raise DiffractionError(f"positions={args.positions} must be from 0 to {MOST_WINDOWS}")
     spectrum = options.wavelengths(args)
     steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
     viewing_angles(args.angles, args.angle_step, args.theta, args.order)
@@ -189,7 +192,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
         return method.brdf, method.sigma
     from ..analysis.known_wavelengths import check_material
     from ..analysis.media import optical_scale
-    from ..analysis.scans import bsdf_of, table_of
+    from ..analysis.scans import bsdf_of, check_surface, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..plugin.dictionary import bsdf_dict
     from ..scene.load import set_variant
@@ -200,6 +203,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     asked = {name: value for name, value in settings.items() if name != "step"}
     asked["wavelength_range"] = table_range(steps)
     parameters = surface_parameters(args)
+    check_surface(parameters)
     table = table_of(within, within.settings_for(asked, optical_scale(parameters)), bar)
     return partial(brdf_values, bsdf_of(bsdf_dict(table, **parameters))), table.sigma
 

@@ -372,6 +372,7 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, and its refusal if size alone decides."""
     from ..heights.coherence import resolved
+    from ..heights.validity import units_warning
     from ..tables.build.checks import check_units, check_window, period_of, warnings_of
 
     how = resolved(settings, fields)
@@ -380,7 +381,10 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
         check_window(period_of(fields[0], how), how)
     except DiffractionError as error:
         doubts = [line for field in fields for line in field.validity(settings.wavelength_range)]
-        return [*doubts, f"{fields[0].name}: {error}"]
+        asked = {units for field in fields if (units := units_warning(field))}
+        asked = {units for units in asked if units in str(error)}  # and need not be asked twice
+        others = [line for line in doubts if not any(units in line for units in asked)]
+        return [*others, f"{fields[0].name}: {error}"]
     return warnings_of(fields, settings)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from ..atomic import atomic_path, check_target
 from ..errors import DiffractionError
-from ..inputs import input_at
+from ..inputs import input_at, refuse_in_folder
 from .console import say
 
 #: What a command measured and wrote, for --json.
@@ -139,11 +139,12 @@ def check_outputs(outputs: Iterable[Path], *, make_folder: bool = False) -> None
     make_folder : a missing folder will be made, so the nearest existing one has to be writable.
 
     Raises a DiffractionError as `atomic.check_target` does, or if the folder is missing, cannot be
-    written or is a file. No file is left behind.
+    written, is a file, or is one of which the command reads every file. No file is left behind.
     """
     folders: dict[Path, Path] = {}
     for path in outputs:
         check_target(path)
+        refuse_in_folder(path)
         folders.setdefault(path.parent, path)
     for path in folders.values():
         _check_folder(path, make_folder)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..scene.load import set_variant
 from . import options
-from .brdf_map import surface_options
+from .brdf_map import surface_options, surface_parameters
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
@@ -107,6 +107,7 @@ def run(args: argparse.Namespace) -> Figures:
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
     from ..analysis import spectra_files as files_of_spectra
+    from ..analysis.scans import check_surface
     from ..analysis.spectra import mean_spectra
     from ..analysis.spectrometer import MeasurementGeometry
 
@@ -116,6 +117,7 @@ def run(args: argparse.Namespace) -> Figures:
         args.light, tuple(dict.fromkeys(detectors)), 0.0 if auto else args.light_azimuth,
         args.acceptance,
     )  # fmt: skip
+    check_surface(surface_parameters(args))
     lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
         measurement = Measurement(args, geometry, lam, bar)

@@ -112,16 +112,13 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     args.files = scan_files(args.files)
     args.output = output_of(args, Path("survey"), files_in, make_folder=True)
 
-    from ..analysis.known_wavelengths import known_range
-    from ..analysis.media import medium_index
+    from ..analysis.scans import check_surface
     from ..analysis.survey import run_survey
     from ..analysis.treatments import Treatment, load_treatments
 
     treatments = load_treatments(args.treatments)
     variant = set_variant(args.mode or "llvm_ad_rgb")
-    # a wrong name is refused before hours of tables
-    known_range(args.material, args.pigment)
-    medium_index(args.ext_ior)
+    check_surface(surface_parameters(args))
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
         client = stack.enter_context(client_of(args)) if on_workers(args) else None
         if client is not None:

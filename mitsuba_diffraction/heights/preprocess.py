@@ -83,7 +83,7 @@ def crop(field: HeightField, region: Region) -> HeightField:
 
 
 def fill_missing(heights: Real, method: str | None, name: str) -> tuple[Real, str]:
-    """Replace NaN by heights interpolated or extended from the points around.
+    """Replace NaN and infinite heights by heights interpolated or extended from the points around.
 
     Raises a DiffractionError if points are missing and `method` is `None`, or more than half of
     them are.
@@ -91,7 +91,7 @@ def fill_missing(heights: Real, method: str | None, name: str) -> tuple[Real, st
     Parameters
     ----------
     heights
-        Shape (ny, nx); points without data are NaN.
+        Shape (ny, nx); points without data are NaN or infinite.
     method
         "nearest": the height of a nearest measured point. "harmonic": the membrane spanned over
         each gap, ∇²h = 0 with the measured border and free edges of the patch. `None` refuses.
@@ -103,16 +103,16 @@ def fill_missing(heights: Real, method: str | None, name: str) -> tuple[Real, st
     Real, str
         The filled heights, and a line that says how many points were filled; "" if none were.
     """
-    missing = np.isnan(heights)
+    missing = ~np.isfinite(heights)
     count = int(np.count_nonzero(missing))
-    if count == 0 or np.isinf(heights).any():  # HeightField refuses infinite heights
+    if count == 0:
         return heights, ""
     share = f"{count} of {heights.size} points ({count / heights.size:.2g} of all)"
     if count == heights.size:
         raise DiffractionError(f"{name}: no height is a finite number; the patch is empty")
     if method is None:
         raise DiffractionError(
-            f"{name}: {share} have no height (NaN or masked); fill them, "
+            f"{name}: {share} have no height (NaN, infinite or masked); fill them, "
             f"fill={' or fill='.join(FILLS)}, or keep a middle without them: crop, in µm"
         )
     if count > LARGEST_SHARE * heights.size:

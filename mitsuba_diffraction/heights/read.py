@@ -216,12 +216,16 @@ def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
         values, line = preprocess.part_of(values, pixel_size, options.crop, shown)
         notes = (*notes, line) if line else notes
     heights = np.ascontiguousarray(values, dtype=np.float64)
-    method = None if options.fill == "none" else options.fill
-    heights, note = preprocess.fill_missing(heights, method, shown)
+    heights, note = preprocess.fill_missing(heights, fill_method(options), shown)
     if heights.base is None and heights is not raw.values:
         heights.setflags(write=False)  # nothing else refers to it: HeightField need not copy it
     history = (*notes, note) if note else notes
     return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
+
+
+def fill_method(options: LoadOptions) -> str | None:
+    """Return the method that fills points without data; None refuses them."""
+    return None if options.fill == "none" else options.fill
 
 
 def _lengths(

@@ -15,7 +15,8 @@ from ..errors import DiffractionError, warn
 from ..files import FileKind
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto
-from ..heights.read import LoadOptions, treat
+from ..heights.preprocess import fill_missing
+from ..heights.read import LoadOptions, fill_method, treat
 from ..settings import SURFACE, checked
 from ..tables.source import TableSource, loaded_table
 from ..tables.table import DiffractionTable
@@ -141,7 +142,11 @@ def _heights_of(data: Any, options: LoadOptions) -> HeightField:
     values = np.array(data, np.float64)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
-    return HeightField(values, options.pixel_size, name="data")
+    history: list[str] = []
+    if values.ndim == 2:  # a HeightField refuses others
+        values, line = fill_missing(values, fill_method(options), "data")
+        history = [line] if line else []
+    return HeightField(values, options.pixel_size, name="data", history=history)
 
 
 def _no_heights(shown: str) -> HeightField:

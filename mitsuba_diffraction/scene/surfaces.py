@@ -93,12 +93,9 @@ def put_materials(
     numbers = {name: _node_of(state, name, of_meshes) for name in materials}
     for name, number in numbers.items():
         if twice := [other for other, n in numbers.items() if n == number and other != name]:
-            raise DiffractionError(
-                f"{MATERIAL}{name}, {MATERIAL}{twice[0]}: both ids are of one BSDF; keep one"
-            )
+            raise DiffractionError(f"{name!r} and {twice[0]!r}: both ids are of one BSDF; keep one")
         if not (state.nodes[number].type == mi.ObjectType.Shape or _shapes_with(state, number)):
-            raise DiffractionError(f"{MATERIAL}{name}: no shape uses the BSDF {name!r}; "
-                                   f"{_used_ids(state)}")  # fmt: skip
+            raise DiffractionError(f"no shape uses the BSDF {name!r}; {_used_ids(state)}")
     # BSDFs first: a shape takes over what lies beneath its own surface
     for name, number in sorted(
         numbers.items(), key=lambda pair: state.nodes[pair[1]].type == mi.ObjectType.Shape
@@ -111,8 +108,8 @@ def put_materials(
         if not shapes:
             others = ", ".join(other for other in numbers if other != name)
             raise DiffractionError(
-                f"{MATERIAL}{name}: no shape is left that uses the BSDF {name!r}, since {others} "
-                "got surfaces of their own; leave one out"
+                f"no shape is left that uses the BSDF {name!r}, since {others} got surfaces of "
+                "their own; leave one out"
             )
         file, *rest = _COMMA.split(materials[name], maxsplit=1)
         label = file.removeprefix(PRESET) if file.startswith(PRESET) else Path(file).name
@@ -200,9 +197,9 @@ def _node_of(state: Any, name: str, of_meshes: Sequence[str]) -> int:
         listed = ", ".join(sorted(known, key=lambda k: (known[k], k)))
         meshes = f"; materials of its meshes are {', '.join(of_meshes)}" if of_meshes else ""
         raise DiffractionError(
-            f"{MATERIAL}{name}: no BSDF or shape of the scene has this id, and no material of its "
-            "glTF meshes this name; there are "
-            f"{listed or 'none: add id attributes to the scene'}{meshes}"
+            f"no BSDF or shape of the scene has the id {name!r}, and no material of its glTF "
+            f"meshes this name; there are {listed or 'none: add id attributes to the scene'}"
+            f"{meshes}"
         )
     return int(known[name])
 

@@ -160,7 +160,7 @@ def test_scans_are_files_folders_and_patterns(tmp_path):
     (tmp_path / "empty").mkdir()
     listed = scan_files([tmp_path / "b_*.npy", tmp_path, tmp_path / "missing.npy"])
     assert [file.name for file in listed] == ["b_1.npy", "b_2.npy", "a.txt", "missing.npy"]
-    for nothing in (tmp_path / "empty", tmp_path / "*.spm"):
+    for nothing in (tmp_path / "empty", tmp_path / "*.spm", tmp_path / "missing.npy"):
         with pytest.raises(DiffractionError, match=re.escape(str(nothing))):
             scan_files([nothing])
 

@@ -173,6 +173,13 @@ def test_a_patch_of_nanometres_is_not_advised_a_window_of_nanometres(run, tmp_pa
     assert "check its pixel size" in ran.out
 
 
+def test_a_question_about_units_is_asked_once(run, here):
+    np.save("nm.npy", np.tile(100.0 * np.sin(np.arange(64)), (64, 1)))
+    ran = run("info", "nm.npy", "--pixel-size", 0.05)
+    assert ran.out.count("in nm? Then divide") == 1
+    assert "cannot build the table" in ran.out
+
+
 @pytest.mark.parametrize("own", [True, False])
 @pytest.mark.parametrize("kind", ["ply", "obj"])
 def test_normals_are_those_of_the_file(run, tmp_path, kind, own):

@@ -80,6 +80,29 @@ def test_a_default_output_over_an_input_gets_another_name_in_one_line(run, world
     assert all(after[name] == content for name, content in before.items())
 
 
+@pytest.mark.parametrize(
+    "command",
+    ["survey scans -o scans", "survey scans -o .", "spectrum scans -o scans/a.csv",
+     "spectrum ../here/scans -o scans/a.csv"],
+)  # fmt: skip
+def test_an_output_among_scans_that_a_second_run_would_read_is_refused(run, world, command):
+    """A survey's folder has a folder `scans` of its own."""
+    Path("scans").mkdir()
+    shutil.copy("h.npy", "scans")
+    assert "choose another folder" in run(*shlex.split(command)).failed_in_one_line()
+    assert os.listdir("scans") == ["h.npy"]
+
+
+@pytest.mark.parametrize(
+    "command", ["survey nothere", "spectrum nothere", "spectrum --group a=h.npy --group b=nothere"]
+)
+def test_scans_that_do_not_exist_are_refused_and_nothing_is_written(run, world, command):
+    before = _contents(world)
+    assert "'nothere' does not exist" in run(*shlex.split(command)).failed_in_one_line()
+    assert _contents(world) == before
+    assert not Path("survey").exists()
+
+
 @posix
 @pytest.mark.parametrize("link", [os.link, os.symlink], ids=["hard", "symbolic"])
 def test_links_to_an_input_are_that_input(run, world, link):

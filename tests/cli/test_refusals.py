@@ -68,8 +68,12 @@ REFUSED = {
         "--crops 400": "crops=400",
         "--observer dragon": "dragon",
     },
+    # heights with notes, which would be in vain
+    f"spectrum noise.npy {_SMALL}": {"--coat-ior 0.5": "coat_ior=0.5 must be"},
+    f"brdf-map noise.npy {_SMALL}": {"--coat-ior 0.5": "coat_ior=0.5 must be"},
     "spectrum": {"empty": "empty", "none*.npy": "none*.npy", "--group a=none*.npy": "no file"},
     "survey grating.npy -o out": {
+        "--pixel-size 0.08 --coat-ior 0.5": "coat_ior=0.5 must be",
         "--material kerratin": "kerratin",
         "--ext-ior melanin": "melanin",
         "--pigment blueish": "blueish",
@@ -91,6 +95,7 @@ REFUSED = {
     "evaluate": {
         "t.exr": "is a table; this needs the heights",
         f"noise.npy {_SMALL} --method nmm": "needs a period",
+        "grating.npy --pixel-size 0.08 --positions 5000": "positions=5000 must be",
     },
     f"sweep terms {_SWEEP}": {
         "--coherence-width 1e300": "coherence_width",

@@ -89,6 +89,20 @@ def test_what_no_table_can_be_made_of_is_refused_and_leaves_all_as_it_was(some_v
         assert np.array(mi.traverse(bsdf)["data"]) == pytest.approx(PATCH.heights, abs=1e-6)
 
 
+@pytest.mark.parametrize("gap", [np.nan, np.inf])
+def test_gaps_are_filled_as_those_of_files(some_variant, gap):
+    holed = PATCH.heights.copy()
+    holed[3, 4] = gap
+    scene = {"type": "diffraction", "data": mi.TensorXf(holed), "pixel_size": "0.09"}
+    with pytest.raises(RuntimeError, match="fill=nearest"):
+        mi.load_dict(scene)
+    filled = np.array(mi.traverse(mi.load_dict({**scene, "fill": "nearest"}))["data"])
+    neighbours = PATCH.heights[[2, 4, 3, 3], [4, 4, 3, 5]]
+    assert np.abs(neighbours - filled[3, 4]).min() < 1e-6
+    known = np.arange(holed.size) != 3 * holed.shape[1] + 4
+    assert filled.ravel()[known] == pytest.approx(PATCH.heights.ravel()[known], abs=1e-6)
+
+
 def test_derivatives_by_heights_are_refused(some_variant):
     bsdf = load()
     parameters = mi.traverse(bsdf)

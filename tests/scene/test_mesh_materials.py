@@ -73,7 +73,7 @@ def test_by_default_other_materials_have_the_surface_of_the_whole(boxes):
 
 def test_an_unknown_name_is_answered_with_the_materials(boxes):
     boxes["material:Lid"] = boxes.pop("material:Cap")
-    with pytest.raises(DiffractionError, match=r"Lid: .* its meshes are Body, Cap$"):
+    with pytest.raises(DiffractionError, match=r"'Lid', .* its meshes are Body, Cap$"):
         loaded(boxes | {"others": "own"})
 
 

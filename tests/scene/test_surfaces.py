@@ -120,6 +120,13 @@ def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surf
     assert "material = Al" not in text
 
 
+def test_an_unknown_id_is_named_as_it_was_typed(surface):
+    with pytest.raises(DiffractionError, match="mat-Skin") as refused:
+        bsdfs(surface, {"Pant": SETTINGS})
+    assert "'Pant'" in str(refused.value)
+    assert "material:" not in str(refused.value)
+
+
 def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):
     spare = EXPORTED.replace("<shape", '<bsdf type="diffuse" id="spare"/><shape', 1)
     (surface / "scene.xml").write_text(spare)

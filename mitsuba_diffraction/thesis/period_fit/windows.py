@@ -78,7 +78,7 @@ def window_fits(
     period : µm; ridges are searched at periods up to 1.5 times larger or smaller.
     """
     if not 1 <= count <= MOST_WINDOWS:
-        raise DiffractionError(f"windows={count} must be from 1 to {MOST_WINDOWS}")
+        raise DiffractionError(f"positions={count} must be from 1 to {MOST_WINDOWS}")
     extent = 2.0 * np.pi / np.array(table.spacing)
     centres = _lattice(count) * extent
     fits: list[Fit | None] = []

@@ -83,7 +83,10 @@ def test_a_start_that_is_the_solution_is_left_as_it_is():
     assert np.array_equal(filled, np.ones((2, 4)))
 
 
-def test_infinite_heights_are_left_to_be_refused():
+@pytest.mark.parametrize("method", FILLS)
+def test_infinite_heights_are_gaps_as_others(method):
     heights = np.ones((2, 5))
-    heights[0, 3:] = np.nan, np.inf
-    assert fill_missing(heights, "harmonic", "patch")[0] is heights
+    heights[0, 2:] = np.nan, np.inf, -np.inf
+    with pytest.raises(DiffractionError, match=r"3 of 10 .* fill=nearest"):
+        fill_missing(heights, None, "patch")
+    assert np.array_equal(fill_missing(heights, method, "patch")[0], np.ones((2, 5)))

@@ -217,8 +217,12 @@ def test_windows_that_cannot_be(scan, more, words):
 
 def test_a_tile_that_is_too_wide_is_told_of_windows(scan):
     tile = HeightField(scan.heights, PIXEL, periodic=True)
-    with pytest.raises(DiffractionError, match=r"windows=1\.2"):
-        DiffractionTable.build(tile, **{**SETTINGS, "coherence_width": 1.2, "tolerance": 1e-4})
+    settings = {**SETTINGS, "coherence_width": 1.2, "tolerance": 1e-4}
+    with pytest.raises(DiffractionError, match=r"windows=1\.2, or crop"):
+        DiffractionTable.build(tile, **settings)
+    with pytest.raises(DiffractionError, match=r"; crop .*crop=1\.2") as refused:
+        DiffractionTable.build(tile, **settings, coherence="patch")
+    assert "windows" not in str(refused.value)  # which coherence='patch' refuses
 
 
 def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
