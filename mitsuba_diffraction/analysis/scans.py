@@ -12,7 +12,8 @@ from ..errors import DiffractionWarning
 from ..heights.field import HeightField
 from ..progress import Progress, silent
 from ..settings import TableSettings
-from ..tables.source import TableSource
+from ..tables.build.build import build_with
+from ..tables.source import TableSource, providing
 from ..tables.table import DiffractionTable
 
 # Of a flat patch whose table takes no time: µm, and parameters.
@@ -47,7 +48,9 @@ def check_surface(parameters: Mapping[str, Any]) -> None:
     medium_index(parameters.get("ext_ior"))
     known_range(parameters.get("material"), parameters.get("pigment"))
     flat = HeightField(np.zeros((2, 2)), _PIXEL, periodic=True)
-    bsdf_of(bsdf_dict(flat, **{**parameters, **_QUICK}))
+    # the cache holds tables of scans alone
+    with providing(lambda request: build_with([flat], request.settings)):
+        bsdf_of(bsdf_dict(flat, **{**parameters, **_QUICK}))
 
 
 def bsdf_of(values: Mapping[str, Any]) -> Any:
