@@ -182,8 +182,7 @@ class Path:
         else:
             visible = correction_within(cos_i, cos_o, self.left.index, sigma_0, k)
         none = np.zeros_like(visible)
-        wi, wo = directions(above_i, above_o, cos_turn)
-        half = boundary.geometry(wi, wo).cos_half
+        half = half_cosine(above_i, above_o, cos_turn)
         cosine = mirror_cosine(half, above_i, above_o, np.asarray(k * sigma_0))
         if self.let_through:
             return visible * self._passed(cosine), none
@@ -217,6 +216,13 @@ def directions(cos_i: Real, cos_o: Real, cos_turn: Real) -> tuple[Direction, Dir
     sin_i, sin_o = (np.sqrt(np.maximum(1.0 - c**2, 0.0)) for c in (cos_i, cos_o))
     across = np.sqrt(np.maximum(1.0 - cos_turn**2, 0.0))
     return (sin_i, np.zeros_like(sin_i), cos_i), (sin_o * cos_turn, sin_o * across, cos_o)
+
+
+def half_cosine(cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
+    """Return the cosine between either of two unit vectors and their half vector, |ωi + ωo|/2."""
+    square_i, square_o = 1.0 - cos_i**2, 1.0 - cos_o**2
+    across = square_i + square_o + 2.0 * np.sqrt(square_i * square_o) * cos_turn
+    return np.asarray(0.5 * np.sqrt(np.maximum(across, 0.0) + (cos_i + cos_o) ** 2))
 
 
 @dataclass(frozen=True)
