@@ -13,9 +13,11 @@ import grimp
 import pytest
 from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
 
+import mitsuba_diffraction
 from tests.support import ROOT
 
 PACKAGE = "mitsuba_diffraction"
+INSTALLED = Path(mitsuba_diffraction.__file__).parent
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 
 
@@ -102,7 +104,7 @@ def hidden_by(name: str) -> Path | None:
 
     Sub-rooms are public; modules that a room exports are, with their names.
     """
-    room, exported = ROOT / PACKAGE, False
+    room, exported = INSTALLED, False
     for part in name.split(".")[1:]:
         if re.match("_(?!_)", part):
             return room
@@ -132,7 +134,7 @@ def names_of_the_package(source: str) -> Iterator[tuple[int, str]]:
 
 def test_programs_use_what_rooms_export():
     wrong = [
-        f"{file.relative_to(ROOT)}:{line}: {name} is not in __all__ of {room.relative_to(ROOT)}: "
+        f"{file.relative_to(ROOT)}:{line}: {name} is not in __all__ of {room.relative_to(INSTALLED.parent)}: "
         "use a name that is, move it to the programs, or export it"
         for folder in ("docs/make", "scenes/make")
         for file in sorted((ROOT / folder).rglob("*.py"))
