@@ -135,7 +135,8 @@ def names_of_the_package(source: str) -> Iterator[tuple[int, str]]:
 def test_programs_use_what_rooms_export():
     wrong = [
         f"{file.relative_to(ROOT)}:{line}: {name} is not in __all__ of "
-        f"{room.relative_to(INSTALLED.parent)}: use a name that is, move it to the programs, or export it"
+        f"{room.relative_to(INSTALLED.parent)}: use a name that is, move it to the programs, "
+        "or export it"
         for folder in ("docs/make", "scenes/make")
         for file in sorted((ROOT / folder).rglob("*.py"))
         for line, name in names_of_the_package(file.read_text("utf-8"))
