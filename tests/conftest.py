@@ -95,7 +95,7 @@ def same_cases_in_every_run() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exempt what is imported by now from collections of garbage: they take a tenth of the time."""
+    """Exempt imported modules from garbage collection, which takes a tenth of the time."""
     import mitsuba  # noqa: F401
 
     gc.collect()

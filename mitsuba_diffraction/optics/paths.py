@@ -113,8 +113,7 @@ class Path:
         """Return the tangential part of n_i ωi + n_o ωo; cos_turn : of the azimuth between."""
         incident = self.came.index**2 * (1.0 - cos_i**2)
         outgoing = self.left.index**2 * (1.0 - cos_o**2)
-        cross = 2.0 * np.sqrt(np.maximum(incident * outgoing, 0.0)) * cos_turn
-        return np.sqrt(np.maximum(incident + outgoing + cross, 0.0))
+        return np.sqrt(_square_of_sum(incident, outgoing, cos_turn))
 
     def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         """Return G of a perfect conductor, or 1/(qi qo w²) of light that is let through.
@@ -220,9 +219,14 @@ def directions(cos_i: Real, cos_o: Real, cos_turn: Real) -> tuple[Direction, Dir
 
 def half_cosine(cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
     """Return the cosine between either of two unit vectors and their half vector, |ωi + ωo|/2."""
-    square_i, square_o = 1.0 - cos_i**2, 1.0 - cos_o**2
-    across = square_i + square_o + 2.0 * np.sqrt(square_i * square_o) * cos_turn
-    return np.asarray(0.5 * np.sqrt(np.maximum(across, 0.0) + (cos_i + cos_o) ** 2))
+    across = _square_of_sum(1.0 - cos_i**2, 1.0 - cos_o**2, cos_turn)
+    return np.asarray(0.5 * np.sqrt(across + (cos_i + cos_o) ** 2))
+
+
+def _square_of_sum(incident: Real, outgoing: Real, cos_turn: Real | float) -> Real:
+    """Return the squared length of the sum of two vectors by their own, and their angle."""
+    cross = 2.0 * np.sqrt(np.maximum(incident * outgoing, 0.0)) * cos_turn
+    return np.asarray(np.maximum(incident + outgoing + cross, 0.0))
 
 
 @dataclass(frozen=True)

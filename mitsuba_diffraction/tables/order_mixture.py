@@ -78,8 +78,8 @@ class OrderMixture:
         self, kappa: NDArray[np.float64], order: NDArray[np.integer]
     ) -> NDArray[np.float64]:
         """Powers of strong orders, 0 … n − 1, each at its own κ, (m,)."""
-        position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
-        lower = position.astype(int)
+        position = np.minimum(kappa / self.kappa_step, len(self.powers) - 1.001)
+        kappa, lower = position * self.kappa_step, position.astype(int)
         share = (position - lower).astype(np.float32)
         low, high = self.powers[lower, order], self.powers[lower + 1, order]
         return np.asarray((low * (1.0 - share) + high * share) * kappa**2)

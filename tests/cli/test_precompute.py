@@ -174,7 +174,7 @@ def test_ctrl_c_leaves_the_folder_as_it_was(run, heights, here, monkeypatch, int
             pass
 
         def write(self, path):
-            Path(path).write_bytes(b"half of it")
+            Path(path).write_bytes(b"half a file")
             interrupt()
 
     if interrupted == "Bar.__call__":

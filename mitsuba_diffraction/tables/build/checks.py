@@ -120,7 +120,8 @@ def too_wide(
     """An error about a patch so wide that a look-up would read more taps than there may be."""
     width = settings.width
     # windows have their powers averaged, and a coherent table has amplitudes
-    windows = "" if settings.coherent else f"average over windows of it, windows={width:g}, or "
+    averaged = f"average over windows of the patch, windows={width:g}, or "
+    windows = "" if settings.coherent else averaged
     return build_error(
         f"the patch is {max(extent):.4g} µm wide, so much more than the coherence window that a "
         f"look-up would read {taps[0]}×{taps[1]} orders; {windows}crop the heights, crop={width:g}"

@@ -274,12 +274,13 @@ class Transport:
         cos_i, sine = self._start(theta[:, None])
         rows_of = np.arange(len(theta))[:, None]
         gain = self._gain(cos_i[:, 0], rows_of, nodes.cosine, nodes.azimuth)
-        kappa = self._kappa(cos_i, nodes.cosine)
-        densities = [(mixture.density, gain * kappa**2)]
+        position = np.minimum(
+            self._kappa(cos_i, nodes.cosine) / mixture.kappa_step, len(mixture.density) - 1.001
+        )
+        densities = [(mixture.density, gain * (position * mixture.kappa_step) ** 2)]
         if mixture.beats is not None:
             zeroth, _ = self._mirrored(cos_i, nodes.cosine, np.cos(nodes.azimuth))
             densities.append((mixture.beats, np.sqrt(gain * zeroth)))
-        position = np.minimum(kappa / mixture.kappa_step, len(mixture.density) - 1.001)
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
         scale = self._path.sign * k / mixture.pitch

@@ -54,7 +54,7 @@ def test_tables_hold_the_boundary_s_gain_in_either_order_of_directions(path):
 
 @pytest.mark.parametrize("index", [1.5, 2.46])
 def test_tables_hold_the_root_at_a_critical_angle(index):
-    """Light let through towards directions within 3° of it on either side."""
+    """Light is let through towards directions within 3° of the critical angle."""
     patch = rough_patch((40, 44), (0.09, 0.09), 0.1)
     exact = ScaleRoughness.from_heights(patch.heights, patch.pixel_size)
     path = Transmitter(index, "small_slope", False).paths(np.array([550.0]), 0.05)[0][1]
