@@ -22,9 +22,10 @@ from ..tables.powers import as_powers
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .arithmetic import index_of, maximum
+from .height_derivatives import DifferentiableHeights
 from .loops import sum_of
 from .memory import HalfFloats, index_between, once_a_table, packet_size, read_packets, upload
-from .series import inner, series_of
+from .series import Recurrence, Tabulated, inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
 from .window_positions import PlacedWindow
 
@@ -44,16 +45,21 @@ def within(qx: Float, qy: Float, radii: tuple[float, float]) -> Mask:
 
 
 class DeviceTable:
-    """A table's coefficients in the memory of the current variant, and how to look them up."""
+    """A table's coefficients in the memory of the current variant, and how to look them up.
 
-    def __init__(self, table: DiffractionTable) -> None:
+    heights : that derivatives are wanted by; `differentiable` then.
+    """
+
+    def __init__(
+        self, table: DiffractionTable, heights: DifferentiableHeights | None = None
+    ) -> None:
         if not table.grid.coherent:
             table = as_powers(table)
         self.expansion, self.grid = table.expansion, table.grid
         self.spacing, self.limited = table.spacing, table.limited
         self.radii, self.q_limit = table.frequency_limit, table.q_limit
         self.record = BinRecord.aligned(*table.coefficients.shape[3:])
-        self._inverse_scale = 1.0 / table.scale
+        self._inverse_scale = 1.0 / table.scale if heights is None else 1.0
         # order 0's lobe is that of a window `order_0_ratio` times as large in area
         self._ratio = table.order_0_ratio
         self._lobe = [_log2(self._ratio * exponent) for exponent in table.grid.exponents]
@@ -64,11 +70,19 @@ class DeviceTable:
                 "or use a smaller patch"
             )
         records = self.record.pack(table.coefficients)
-        self.halves = HalfFloats(records) if records.dtype == np.float16 else None
-        if self.halves is None:
-            self._coefficients = upload(mi.Float, records)
-        self.series = series_of(table)
-        self._looped = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
+        self.halves, self.differentiable = None, heights is not None
+        if heights is not None:
+            self._coefficients, order_0 = heights.coefficients(table, self.record)
+            self.series: Recurrence | Tabulated = Recurrence(table, order_0)
+        else:
+            self.series = series_of(table)
+            if records.dtype == np.float16:
+                self.halves = HalfFloats(records)
+            else:
+                self._coefficients = upload(mi.Float, records)
+        many = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
+        # Dr.Jit 1.5 fails at forward derivatives of memory that several loops read
+        self._looped = many and heights is None
 
     def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""

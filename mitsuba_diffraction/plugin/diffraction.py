@@ -11,7 +11,7 @@ filename : string
     of `mitsuba-diffraction precompute`.
 data : mi.TensorXf
     Instead: heights, µm, shape (ny, nx); in dictionaries only. `md.bsdf_dict` passes a HeightField.
-    `mi.traverse` has it: other heights make another table.
+    `mi.traverse` has it: other heights make another table; for derivatives see below.
 pixel_size : float or string [from the file]
     Distance between heights, µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
@@ -155,6 +155,10 @@ between s and p.
 (docs/energy.md). The scale costs seconds once and is cached. It is interpolated over height_scale.
 For its derivative, enable the derivative of height_scale before parameters.update(). Derivatives by
 indices and films hold it constant, in steps of 5 nm of film_thickness.
+
+**Derivatives by heights** in renderings take data, `periodic=exact`, `basis=chebyshev`,
+`model=kirchhoff`, `energy_conserving=false`, no BSDF beneath, a spectral or mono variant and a
+window about as wide as the patch.
 
 **The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface and
 its coat. Spectra of pigments are constant beyond their ends.

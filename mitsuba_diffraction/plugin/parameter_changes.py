@@ -88,49 +88,58 @@ class Bounded:
 class GivenHeights:
     """Heights given as `data`: another table is made where they change.
 
-    Derivatives by heights are of `md.design`: a table has none.
-
     Parameters
     ----------
     name : for `mi.traverse`.
     heights : µm, shape (ny, nx).
     make : function of heights (ny, nx), µm, that returns their patch, or raises a DiffractionError.
+
+    Attributes
+    ----------
+    values : `mi.TensorXf`, always the same object: Mitsuba assigns to it.
+    missing : what the surface lacks to have derivatives by heights; empty where it has them.
     """
 
     def __init__(
         self, name: str, heights: NDArray[np.float64], make: Callable[[NDArray[np.float64]], Any]
     ) -> None:
-        self._values, self._loaded = tensor(heights), heights
+        self.values, self._loaded = tensor(heights), heights
         self._name, self._make = name, make
+        self.missing: list[str] = []
         self._first = self._kept = self._served = self._numbers()
+        self._served_derivatives = False
+
+    @property
+    def differentiable(self) -> bool:
+        """Whether derivatives by the heights are wanted."""
+        return bool(dr.grad_enabled(self.values))
 
     def _numbers(self) -> NDArray[Any]:
-        return np.array(dr.detach(self._values))
+        return np.array(dr.detach(self.values))
 
     def made(self) -> Any:
-        """Return the patch of heights that changed; None if they did not."""
-        numbers = self._numbers()
-        if np.array_equal(numbers, self._served):
+        """Return the patch of heights that changed, or have derivatives; None of others."""
+        numbers, derivatives = self._numbers(), self.differentiable
+        same = np.array_equal(numbers, self._served)
+        if same and not (derivatives or self._served_derivatives):
             return None
         as_loaded = np.array_equal(numbers, self._first)  # then in double precision
         made = self._make(self._loaded if as_loaded else numbers.astype(np.float64))
-        self._served = numbers
+        self._served, self._served_derivatives = numbers, derivatives
         return made
 
     def refusal(self) -> str | None:
         """See `Changeable.refusal`."""
-        if dr.grad_enabled(self._values):
-            return f"{self._name} has no derivatives in a rendering; md.design has them"
-        if self._values.shape == self._kept.shape:
+        if self.differentiable and self.missing:
+            return f"{self._name} has derivatives only with {', '.join(self.missing)}"
+        if self.values.shape == self._kept.shape:
             return None
-        shape, kept = (
-            " × ".join(map(str, each)) for each in (self._values.shape, self._kept.shape)
-        )
+        shape, kept = (" × ".join(map(str, each)) for each in (self.values.shape, self._kept.shape))
         return f"{self._name} of {shape} heights must be of {kept}, as loaded; load the plugin anew"
 
     def restore(self) -> None:
         """See `Changeable.restore`."""
-        mi.set_property(self._values, tensor(self._kept))
+        mi.set_property(self.values, tensor(self._kept))
 
     def keep(self) -> None:
         """See `Changeable.keep`."""
@@ -138,7 +147,9 @@ class GivenHeights:
 
     def traverse(self, callback: Callback) -> None:
         """See `Changeable.traverse`."""
-        callback.put(self._name, self._values, mi.ParamFlags.NonDifferentiable)
+        flags = mi.ParamFlags
+        flag = flags.NonDifferentiable if self.missing else flags.Differentiable
+        callback.put(self._name, self.values, flag)
 
 
 class ObjectValues:

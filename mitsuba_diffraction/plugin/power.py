@@ -14,8 +14,9 @@ import mitsuba as mi
 
 from ..optics.geometry import wavenumber
 from ..tables.table import DiffractionTable
-from .device_table import device_table
+from .device_table import DeviceTable, device_table
 from .directions import Pair, PairThrough, TablePoint
+from .height_derivatives import DifferentiableHeights
 from .rgb import RGBPower, rgb_power
 from .sampling import order_sampler
 from .types import Colour, Float, Index, Interaction, Mask, Powers, Vector2f
@@ -37,14 +38,20 @@ class SpectralPower:
     table : the diffraction table.
     wavelength : nm, for mono variants.
     places : positions of windows; None for the table's own window.
+    heights : that derivatives are wanted by, or None.
 
     device : the table in the variant's memory.
     """
 
     def __init__(
-        self, table: DiffractionTable, wavelength: float, places: WindowPositions | None = None
+        self,
+        table: DiffractionTable,
+        wavelength: float,
+        places: WindowPositions | None = None,
+        heights: DifferentiableHeights | None = None,
     ) -> None:
-        self.device, self._places = device_table(table), places
+        self.device = device_table(table) if heights is None else DeviceTable(table, heights)
+        self._places = places
         self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma_0, self._ratio = table.sigma_0, table.order_0_ratio
         # to rounding
@@ -166,7 +173,7 @@ class SpectralPower:
         wavenumbers = self.wavenumbers(si)
         count = len(wavenumbers)
         differentiable = dr.grad_enabled(pair.uv, pair.w, pair.cos_i, pair.cos_o, scale)
-        if differentiable or count == 1 or not dr.is_jit_v(mi.Float):
+        if differentiable or self.device.differentiable or count == 1 or not dr.is_jit_v(mi.Float):
             return [[function.of(k) for k in wavenumbers] for function in functions]
 
         def body(
@@ -203,7 +210,10 @@ PowerModel = SpectralPower | RGBPower
 
 
 def power_model(
-    table: DiffractionTable, wavelength: float, places: WindowPositions | None = None
+    table: DiffractionTable,
+    wavelength: float,
+    places: WindowPositions | None = None,
+    heights: DifferentiableHeights | None = None,
 ) -> PowerModel:
-    """Make the model of the current variant; RGB variants know no `places`."""
-    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength, places)
+    """Make the model of the current variant; RGB variants know no `places` and no `heights`."""
+    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength, places, heights)

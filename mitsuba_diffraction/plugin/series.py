@@ -18,7 +18,7 @@ from ..tables.layout import BinRecord, cells_of, functions_at
 from ..tables.table import DiffractionTable
 from .arithmetic import clip, index_of, minimum
 from .memory import PACKET, index_between, read_record, upload
-from .types import Float, Index
+from .types import Buffer, Float, Index
 
 #: Share of the tolerance that the cells of tabulated functions may add. A parabola through three
 #: points (Chebyshev's nodes) of a cell across which the phase changes by h leaves max|f'''| h³/192.
@@ -41,12 +41,17 @@ class SeriesValue(NamedTuple):
 
 
 class Recurrence:
-    """Chebyshev's and Taylor's series."""
+    """Chebyshev's and Taylor's series.
 
-    def __init__(self, table: DiffractionTable) -> None:
+    order_0 : records of order 0's series in the variant's memory; by default those of the table.
+    """
+
+    def __init__(self, table: DiffractionTable, order_0: Buffer | None = None) -> None:
         self._expansion = table.expansion
         self._record = BinRecord.aligned(*table.order_0.shape[1:])
-        self._order_0 = upload(mi.Float, self._record.pack(table.order_0.astype(np.float32)))
+        if order_0 is None:
+            order_0 = upload(mi.Float, self._record.pack(table.order_0.astype(np.float32)))
+        self._order_0 = order_0
 
     def at(self, kappa: Float) -> SeriesValue:
         """Evaluate the series at κ in rad/µm."""

@@ -7,17 +7,20 @@ from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ..errors import DiffractionError
+from ..tables.build.derivatives import missing
 from . import parameters as read
 from .arithmetic import plain
 from .base import SurfaceBSDF
-from .boundary import Boundary, boundary_of
+from .boundary import KIRCHHOFF, Boundary, boundary_of
 from .conductors import tabulated_range
 from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
+from .height_derivatives import MOST_DIFFERENTIABLE, DifferentiableHeights
 from .layers import UnderFilm
 from .loops import only_in
 from .materials import Material, tinted
@@ -99,6 +102,7 @@ class DiffractingSurface(SurfaceBSDF):
     def ready(self) -> None:
         """See `PluginBSDF.ready`."""
         if self.given is not None:
+            self.given.missing = self._missing()
             self.parameters.append(self.given)
         owners = self.height_scale, self.orientation, self.lateral_scale, self.fresnel
         self.parameters += [each for owner in owners for each in owner.changeable]
@@ -236,7 +240,25 @@ class DiffractingSurface(SurfaceBSDF):
         self.energy.update(self.mean_table, self.scale_range())
 
     def _power(self) -> PowerModel:
-        return power_model(self.table, self.wavelength, self.window_positions)
+        heights = None
+        if self.given is not None and self.given.differentiable:
+            heights = DifferentiableHeights(self.given.values, self.heights().heights)
+        return power_model(self.table, self.wavelength, self.window_positions, heights)
+
+    def _missing(self) -> list[str]:
+        """Return what the surface lacks to have derivatives by its heights."""
+        assert self.given is not None
+        heights, given = self.heights().heights, np.array(self.given.values)
+        treated = heights.shape != given.shape or np.ptp(heights - given) > 1e-5 * np.ptp(given)
+        lacks = {
+            "a spectral or mono variant": mi.is_rgb,
+            "model=kirchhoff": self.boundary.model.name != KIRCHHOFF.name,
+            "energy_conserving=false": self.energy_conserving,
+            "no BSDF beneath": self.nested is not None,
+            "heights that no crop, level or clip changes": treated,
+            "a wider window or a smaller patch": self.table.grid.taps_read > MOST_DIFFERENTIABLE,
+        }
+        return missing(self.table) + [name for name, is_so in lacks.items() if is_so]
 
     def scale_range(self) -> ScaleRange:
         """Return the factors that energy is to be conserved for."""

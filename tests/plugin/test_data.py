@@ -103,13 +103,46 @@ def test_gaps_are_filled_as_those_of_files(some_variant, gap):
     assert filled.ravel()[known] == pytest.approx(PATCH.heights.ravel()[known], abs=1e-6)
 
 
-def test_derivatives_by_heights_are_refused(some_variant):
-    bsdf = load()
-    parameters = mi.traverse(bsdf)
+#: What derivatives by heights take.
+SETTINGS: dict[str, Any] = {
+    "periodic": "exact", "basis": "chebyshev", "model": "kirchhoff", "energy_conserving": False,
+}  # fmt: skip
+#: Own parameters that derivatives by heights do not go with, and what the message asks for.
+WITHOUT: list[tuple[dict[str, Any], str]] = [
+    ({"periodic": "open"}, "periodic=exact"),
+    ({"basis": "svd"}, "basis=chebyshev"),
+    ({"coherence": "patch"}, "coherence=ensemble"),
+    ({"model": "small_slope"}, "model=kirchhoff"),
+    ({"energy_conserving": True}, "energy_conserving=false"),
+    ({"nested": {"type": "diffuse"}}, "no BSDF beneath"),
+    ({"level": "plane"}, "no crop, level or clip"),
+    ({"coherence_width": 0.8}, "a wider window or a smaller patch"),
+]
+
+
+@pytest.mark.parametrize(("own", "asked"), WITHOUT)
+def test_derivatives_by_heights_are_refused_where_there_are_none(some_variant, own, asked):
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **(SETTINGS | own)))
+    before, parameters = values(bsdf, "dielectric"), mi.traverse(bsdf)
+    assert int(parameters.flags("data")) & int(mi.ParamFlags.NonDifferentiable)
     dr.enable_grad(parameters["data"])
     parameters.set_dirty("data")
-    with pytest.raises(md.DiffractionError, match=r"md\.design"):
+    with pytest.raises(md.DiffractionError, match=f"data has derivatives only with .*{asked}"):
         parameters.update()
+    assert np.array_equal(values(bsdf, "dielectric"), before)
+
+
+def test_heights_with_derivatives_have_the_values_of_others(mono):
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **SETTINGS))
+    before, parameters = values(bsdf, "dielectric"), mi.traverse(bsdf)
+    for wanted in (True, False):
+        heights = mi.TensorXf(PATCH.heights.astype(np.float32))
+        parameters["data"] = heights
+        if wanted:
+            dr.enable_grad(parameters["data"])
+        parameters.update()
+        # half floats, with and without their factor
+        assert values(bsdf, "dielectric") == pytest.approx(before, rel=1e-5, abs=1e-6)
 
 
 def test_a_dictionary_can_be_copied(some_variant):

@@ -89,6 +89,55 @@ def test_a_mix_has_the_derivatives_of_differences():
     check(mix, {"weight_back": 0.4, "belly.eta": 1.5, **own})
 
 
+#: What derivatives by heights take, in tables so close that differences of two have no noise.
+BY_HEIGHTS = {
+    "periodic": "exact", "basis": "chebyshev", "model": "kirchhoff", "tolerance": 1e-4,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("variant", "name", "own"),
+    [
+        ("llvm_ad_spectral", "metal", {"height_scale": 1.2, "shadowing": "vcavity"}),
+        ("llvm_ad_mono_polarized", "metal", {"coat_ior": 1.5}),
+        ("llvm_ad_mono", "metal", {"film_ior": 1.5, "film_thickness": 300.0}),
+        ("llvm_ad_mono", "dielectric", {}),
+        ("llvm_ad_spectral", "sheet", {}),
+    ],
+)
+def test_heights_have_the_derivatives_of_differences(variant, name, own):
+    """In one direction of all changes of the heights, forward and backward."""
+    if not runs(variant):
+        pytest.skip(f"Dr.Jit has no device for {variant}")
+    mi.set_variant(variant)
+    loaded = scene(plate(name, 6.0, **(BY_HEIGHTS | own)))
+    parameters, key = mi.traverse(loaded), "plate.bsdf.data"
+    heights = np.array(parameters[key])
+    change = np.random.default_rng(1).normal(size=heights.shape)
+    change *= 1e-3 / np.abs(change).max()
+
+    def picture(at, seeds=(2, 1), wanted=False):
+        parameters[key] = mi.TensorXf(at.astype(np.float32))
+        if wanted:
+            dr.enable_grad(parameters[key])
+        parameters.update()
+        return mi.render(loaded, parameters, spp=64, seed=seeds[0], seed_grad=seeds[1])
+
+    ends = [np.array(picture(heights + sign * change, (1, 2)), float) for sign in (0.5, -0.5)]
+    difference, image = ends[0] - ends[1], picture(heights, wanted=True)
+    dr.set_grad(parameters[key], mi.TensorXf(change.astype(np.float32)))
+    dr.enqueue(dr.ADMode.Forward, parameters[key])
+    dr.traverse(dr.ADMode.Forward)
+    forward = np.array(dr.grad(image), float)
+    # tables of 1e-4, whose errors differ by less from one to the next
+    assert np.abs(forward - difference).sum() < 0.01 * np.abs(difference).sum()
+    weights = np.random.default_rng(3).random(forward.shape)
+    dr.backward(dr.sum(picture(heights, wanted=True) * mi.TensorXf(weights), axis=None))
+    backward = np.sum(np.array(dr.grad(parameters[key]), float) * change)
+    # to rounding of sums
+    assert backward == pytest.approx(np.sum(forward * weights), rel=1e-3, abs=1e-4)
+
+
 def test_a_mix_by_a_texture_has_the_derivatives_of_differences():
     mi.set_variant("llvm_ad_mono")
     mix = {

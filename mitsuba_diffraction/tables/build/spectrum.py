@@ -58,8 +58,8 @@ class Spectrum:
         middle = 0.5 * (highest + lowest)
         np.subtract(field.heights, middle, out=self.heights, dtype=np.float64, casting="same_kind")
         self.last, self._tile, self._threaded = last, filled(field.shape, tapers), threaded
-        self._columns = _Crop(self._tile[1], last[0])
-        self._rows = _Crop(self._tile[0], last[1])
+        self._columns = Crop(self._tile[1], last[0])
+        self._rows = Crop(self._tile[0], last[1])
         # of mean square 1 over the tile, so that powers add up to the screen's (Parseval)
         self._tapers = [
             (np.ones(n) if taper is None else taper * np.sqrt(tile / n)).astype(self.real_type)
@@ -150,7 +150,7 @@ def filled(shape: tuple[int, int], tapers: Tapers) -> tuple[int, int]:
     return y, x
 
 
-class _Crop:
+class Crop:
     """Which DFT bins of n are wanted, and where they go in an array of bins −last … last."""
 
     def __init__(self, n: int, last: int) -> None:
