@@ -187,10 +187,11 @@ class Quadrature(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def quadrature(rings: int, widest: int, sine: float = 1.0) -> Quadrature:
+def quadrature(rings: int, widest: int, sine: float = 1.0, *, upper: bool = False) -> Quadrature:
     """Place directions on rings, with `widest` azimuths on the widest.
 
     sine : of an angle that has so many rings on either side.
+    upper : only directions of y > 0, with as many of y < 0 opposite.
     """
     position, share = np.polynomial.legendre.leggauss(rings)
     ends = sorted({0.0, math.asin(sine), 0.5 * math.pi})
@@ -198,9 +199,13 @@ def quadrature(rings: int, widest: int, sine: float = 1.0) -> Quadrature:
     angles = (np.array(ends[:-1])[:, None] + halves * (position + 1.0)).ravel()
     share = (share * halves).ravel()
     steps = np.maximum(8, np.rint(widest * np.sin(angles)).astype(int))
+    steps += steps % 2 if upper else 0
     theta, count = np.repeat(angles, steps), np.repeat(steps, steps)
-    turn = np.concatenate([np.arange(n) + 0.381966 * ring for ring, n in enumerate(steps)])
+    # rings are turned against each other, or symmetric
+    starts = np.full(len(steps), 0.5) if upper else 0.381966 * np.arange(len(steps))
+    turn = np.concatenate([np.arange(n) + start for start, n in zip(starts, steps, strict=True)])
     azimuth = np.mod(turn * 2.0 * np.pi / count + np.pi, 2.0 * np.pi) - np.pi
     weights = np.repeat(share, steps) * np.sin(theta) * 2.0 * np.pi / count
     x, y = np.sin(theta) * np.cos(azimuth), np.sin(theta) * np.sin(azimuth)
-    return Quadrature(x, y, np.cos(theta), theta, azimuth, weights)
+    nodes = x, y, np.cos(theta), theta, azimuth, weights
+    return Quadrature(*(part[y > 0.0] if upper else part for part in nodes))

@@ -103,9 +103,9 @@ class ScatteredOrders:
         #: Least w of light let through
         self.least_width = densest * self.mixture.kappa_step / shortest
 
-    def nodes_within(self, critical_sine: float) -> Quadrature:
-        """Return directions on both sides of a critical angle."""
-        return quadrature(*self._directions, critical_sine)
+    def upper_nodes(self, critical_sine: float) -> Quadrature:
+        """Return directions of y > 0 on both sides of a critical angle."""
+        return quadrature(*self._directions, critical_sine, upper=True)
 
     def incidence(self, grid: DirectionGrid, k: float) -> DirectionGrid:
         """Return a grid with azimuths close enough for the weak orders' light of wavenumber k.
@@ -184,15 +184,17 @@ class Transport:
         self, theta: Real, phi: Real, grid: DirectionGrid
     ) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to order 0, which goes to all directions."""
-        nodes = self._orders.nodes_within(self._path.left.critical_sine)
+        nodes = self._orders.upper_nodes(self._path.left.critical_sine)
         shares = np.concatenate(
             [self._order_0_at(theta[rows], nodes) for rows in _blocks(len(theta), len(nodes.x))]
         )
         turns = grid.turns(phi)
+        # light that comes in the plane y = 0 leaves alike on both sides of it
         kernels = [
-            (turned, shares @ grid.interpolation(nodes.theta, nodes.azimuth + offset).matrix)
+            (turned, shares @ sum(grid.interpolation(nodes.theta, offset + side).matrix
+                                  for side in (nodes.azimuth, -nodes.azimuth)))
             for offset, turned in turns.offsets
-        ]
+        ]  # fmt: skip
 
         def light(s: Single) -> Single:
             found, pages = np.empty((len(theta), len(phi)), np.float32), turns.seen(s)
@@ -203,14 +205,17 @@ class Transport:
         return light
 
     def _order_0_at(self, theta: Real, nodes: Quadrature) -> Single:
-        """Return shares (t, n) of order 0 that go to the quadrature's directions."""
-        cos_i, sine = self._start(theta[:, None])
-        path = self._path
+        """Return shares (t, n) of order 0 that go to the quadrature's directions in its lobe."""
+        cosines, sine = self._start(theta[:, None])
         squared = ((nodes.x + sine) ** 2 + nodes.y**2) / self._width_0**2
-        lobe = np.exp(-squared) / (math.pi * self._width_0**2) * nodes.cosine * nodes.weights
-        power = self._orders.order_0(self._per_w * path.width(cos_i, nodes.cosine))
-        gain, face = self._mirrored(cos_i, nodes.cosine, np.cos(nodes.azimuth))
-        return np.asarray(lobe * (gain * power + face), np.float32)
+        shares = np.zeros(squared.shape, np.float32)
+        row, node = within = np.nonzero(squared < LOBE_END**2)
+        cos_i, cos_o, path = cosines[row, 0], nodes.cosine[node], self._path
+        lobe = np.exp(-squared[within]) / (math.pi * self._width_0**2) * cos_o * nodes.weights[node]
+        power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
+        gain, face = self._mirrored(cos_i, cos_o, np.cos(nodes.azimuth[node]))
+        shares[within] = lobe * (gain * power + face)
+        return shares
 
     def _order_0_shares(self, theta: Real, grid: DirectionGrid) -> Real:
         """Return shares (t, rows) of order 0 that go to the polar angles of a grid.
