@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction import DiffractionError, HeightField, gratings
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.analysis import survey as module
 from mitsuba_diffraction.analysis.iridescence import light_and_chance
 from mitsuba_diffraction.analysis.maps.result import LightDirection
@@ -22,7 +22,6 @@ from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
-from mitsuba_diffraction.tables.table import DiffractionTable
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough

@@ -9,13 +9,9 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.cli.tangents import _GUIDES
+from mitsuba_diffraction.scene.orientation import TriangleMesh, grid_faces, load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.directions import GUIDES
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
-from mitsuba_diffraction.scene.orientation.trimesh import (
-    TriangleMesh,
-    grid_faces,
-    vertex_normals,
-)
+from mitsuba_diffraction.scene.orientation.trimesh import vertex_normals
 from scenes.make import knot
 
 

@@ -25,7 +25,7 @@ from mitsuba_diffraction.plugin.description import Consumer, describe
 from mitsuba_diffraction.realtime.glsl import Renderer
 from mitsuba_diffraction.realtime.glsl.shader_materials import GLSL
 from mitsuba_diffraction.realtime.web.export import make_page
-from mitsuba_diffraction.scene.pictures import read_exr
+from mitsuba_diffraction.scene import read_exr
 from tests.support.blender import blender, result_of
 from tests.support.pictures import picture
 from tests.support.surfaces import SURFACES

@@ -27,12 +27,12 @@ _SIZE, _PAGE, _BEFORE = 1 << 16, 4096, b"what was there before"
 def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
     """Return functions that write small files by name; frames of films lie in `scratch`."""
     from mitsuba_diffraction.analysis.export.rgl import DEFAULT, save_rgl
-    from mitsuba_diffraction.cli.report import save_figure, save_json
+    from mitsuba_diffraction.cli import save_json
+    from mitsuba_diffraction.cli.report import save_figure
     from mitsuba_diffraction.scene.frames import FILMS, write_film
-    from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
-    from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
+    from mitsuba_diffraction.scene.orientation import TriangleMesh, write_ply
     from mitsuba_diffraction.scene.pictures import write_exr, write_png
-    from mitsuba_diffraction.tables.exr import write_channels
+    from mitsuba_diffraction.tables import write_channels
     from mitsuba_diffraction.tables.store import Record, write_record
     from tests.support.directions import rough_patch
     from tests.support.orders import thin_grating

@@ -16,8 +16,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.plugin import installed
-from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
+from mitsuba_diffraction.scene.orientation import TriangleMesh, write_ply
 from tests.support import ROOT
 from tests.support.command_line import Ran
 

@@ -65,13 +65,13 @@ def heights(path: Path) -> object:
 
 
 def mesh(path: Path) -> object:
-    from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
+    from mitsuba_diffraction.scene.orientation import load_mesh
 
     return load_mesh(path)
 
 
 def scene(path: Path) -> object:
-    from mitsuba_diffraction.scene.load import load_scene
+    from mitsuba_diffraction.scene import load_scene
 
     return load_scene(path, {})
 
@@ -195,7 +195,7 @@ def _(path: Path) -> None:
 def run(names: list[str], folder: Path) -> None:
     """Write and read files; print what is said of each."""
     from mitsuba_diffraction.errors import DiffractionError
-    from mitsuba_diffraction.scene.load import set_variant
+    from mitsuba_diffraction.scene import set_variant
     from mitsuba_diffraction.system import peak_memory
 
     set_variant("scalar_rgb")

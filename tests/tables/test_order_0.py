@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.heights import LoadOptions
 from mitsuba_diffraction.heights.coherence import LOOKUP
-from mitsuba_diffraction.heights.read import LoadOptions, treated_by_default
+from mitsuba_diffraction.heights.read import treated_by_default
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from tests.support.directions import lit_pairs, polar
 from tests.support.patches import SMALL_SCAN, relative_error

@@ -40,7 +40,7 @@ def test_every_parameter_is_described_once(some_variant):
 
 
 def test_the_defaults_are_those_of_the_code(some_variant, patch):
-    from mitsuba_diffraction.tables.table import DiffractionTable
+    from mitsuba_diffraction import DiffractionTable
 
     def default(name):
         return BY_NAME[name].default

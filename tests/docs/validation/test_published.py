@@ -8,9 +8,7 @@ import pytest
 from docs.make.validation.light import light_of
 from docs.make.validation.published import PUBLISHED
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.orders.solve.chandezon import Chandezon
-from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
+from mitsuba_diffraction.orders.solve import Chandezon, CoupledWaves, IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.stations import reversed_light
 

@@ -21,7 +21,7 @@ from mitsuba_diffraction.realtime.glsl.packing import (
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.reference import boundary, fresnel, model
-from mitsuba_diffraction.tables.colour.table import cached_colours
+from mitsuba_diffraction.tables.colour import cached_colours
 from tests.support.directions import as_single, uniform_directions
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 

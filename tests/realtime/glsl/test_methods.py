@@ -46,7 +46,7 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     shortened,
 )
 from mitsuba_diffraction.reference.fresnel import reflectance
-from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
+from mitsuba_diffraction.tables.colour import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
 from mitsuba_diffraction.thesis.shaders.pack import pack_method, thesis_method

@@ -13,7 +13,7 @@ from mitsuba_diffraction import DiffractionTable, reference
 from mitsuba_diffraction.realtime.glsl.modelled import Modelled
 from mitsuba_diffraction.realtime.glsl.packing import pack_colours
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
-from mitsuba_diffraction.tables.colour.table import cached_colours
+from mitsuba_diffraction.tables.colour import cached_colours
 from tests.support.kinds import COATED, SLOPE
 from tests.support.lanes import interaction, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
