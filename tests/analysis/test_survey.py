@@ -206,18 +206,6 @@ def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path)
     assert 0.02 < np.mean(scales) < disc
 
 
-def test_gratings_of_two_directions_are_both_found():
-    n = 256
-    x, y = PIXEL * np.arange(n), PIXEL * np.arange(n)[:, None]
-    heights = 0.03 * np.sin(2 * np.pi * x / 1.3) + 0.02 * np.sin(2 * np.pi * y / 2.1)
-    from mitsuba_diffraction.heights.spectra import dominant_periods
-
-    one, other = dominant_periods(HeightField(heights, PIXEL))
-    assert (one.period, other.period) == pytest.approx((1.3, 2.1), rel=0.01)
-    assert (one.direction, other.direction) == pytest.approx((0.0, 90.0), abs=1.0)
-    assert (one.share, other.share) == pytest.approx((9 / 13, 4 / 13), abs=0.02)
-
-
 def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
     said = []
 

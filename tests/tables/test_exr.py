@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -17,6 +18,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.files import TABLE_ATTRIBUTE
+from mitsuba_diffraction.tables.exr import write_channels
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
 from tests.support.directions import rough_patch
 from tests.support.table_files import Contents
@@ -246,6 +248,22 @@ def test_a_write_that_breaks_off_leaves_the_older_table(saved, monkeypatch):
         table.save(saved)
     assert saved.read_bytes() == before
     assert os.listdir(saved.parent) == [saved.name]
+
+
+def test_a_writer_that_loses_the_error_of_a_full_disk_is_found_out(tmp_path, monkeypatch):
+    """OpenEXR closes its file without a word where the last buffer does not fit."""
+    target = tmp_path / "a.exr"
+    target.write_text("before")
+
+    class Losing(OpenEXR.File):
+        def write(self, name: str) -> None:
+            Path(name).touch()
+
+    monkeypatch.setattr(OpenEXR, "File", Losing)
+    with pytest.raises(DiffractionError, match="is the disk full"):
+        write_channels(target, {"Y": np.ones((2, 2), np.float32)})
+    assert target.read_text() == "before"
+    assert os.listdir(tmp_path) == ["a.exr"]
 
 
 def test_a_full_disk_is_one_line_and_leaves_nothing(saved, tmp_path):
