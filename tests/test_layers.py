@@ -79,13 +79,18 @@ def imported(file: Path) -> Iterator[str]:
 _IMPORT = re.compile(r"^\s*(?:from|import) (tests\b[\w.]*)(?: import (.+))?", re.M)
 
 
+def room_of(test: Path) -> str:
+    """First folder of a test's path; helpers that a room's tests share may lie there."""
+    return test.relative_to(ROOT / "tests").parts[0]
+
+
 def test_tests_import_helpers_and_never_one_another():
     wrong = [
         f"{file.relative_to(ROOT)} imports {name}"
         for file in TESTS
         for name in imported(file)
-        # the fuzz is a program of several modules
-        if name.split(".")[1] != "support" and not ("fuzz" in file.parts and "fuzz" in name)
+        if name.split(".")[1] not in ("support", room_of(file))
+        or re.search(r"\.(test_\w+|conftest)$", name)
     ]
     assert not wrong
 

@@ -11,7 +11,7 @@ pytest.importorskip("distributed")
 from mitsuba_diffraction import cluster
 from mitsuba_diffraction.cluster import groups, tasks
 from mitsuba_diffraction.scene import load_scene, passes, set_variant
-from tests.support.clusters import SPP, VARIANT, silent
+from tests.cluster.clusters import SPP, VARIANT, silent
 from tests.support.kernels import vectors_of
 from tests.support.room import SCENE
 

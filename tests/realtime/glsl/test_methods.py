@@ -50,10 +50,10 @@ from mitsuba_diffraction.tables.colour import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
 from mitsuba_diffraction.thesis.shaders.pack import pack_method, thesis_method
+from tests.realtime.glsl.shaders import DAYLIGHT, PERFECT, difference, probed, shaded
 from tests.support.directions import polar
 from tests.support.lanes import interaction, vectors
 from tests.support.patches import SMALL_SCAN
-from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed, shaded
 
 pytestmark = pytest.mark.thorough
 

@@ -14,11 +14,11 @@ from mitsuba_diffraction.realtime.glsl.modelled import Modelled
 from mitsuba_diffraction.realtime.glsl.packing import pack_colours
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour import cached_colours
+from tests.realtime.glsl.shaders import PERFECT, difference, probed
 from tests.support.kinds import COATED, SLOPE
 from tests.support.lanes import interaction, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
 from tests.support.patches import SPECKLE
-from tests.support.shaders import PERFECT, difference, probed
 
 STRETCH, WAVELENGTH = 0.7, 550.0
 
