@@ -35,7 +35,7 @@ SOON = 120
 STUCK = """
 import ctypes
 from mitsuba_diffraction.atomic import atomic_path
-from mitsuba_diffraction.heights.source import Source
+from mitsuba_diffraction.heights import Source
 
 def read(*_):
     with atomic_path("out.exr"):
