@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.files import MESHES
 from mitsuba_diffraction.scene.parameters import parameters_of
 from mitsuba_diffraction.scene.stage import STUDIO
