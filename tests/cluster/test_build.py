@@ -12,10 +12,7 @@ distributed = pytest.importorskip("distributed")
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import jobs as jobs_module  # noqa: E402
 from mitsuba_diffraction.cluster.jobs import OrderedMap  # noqa: E402
-from mitsuba_diffraction.settings import TableSettings  # noqa: E402
 from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
-
-WANTED = TableSettings(**SETTINGS)
 
 
 @pytest.fixture(scope="module")
