@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import stat
 import subprocess
 import sys
 import tracemalloc
@@ -104,16 +103,6 @@ def test_other_programs_find_named_float_channels_and_what_they_mean(saved):
     assert document["version"] == FORMAT_VERSION
     assert document["coherence_width"] == 1.8
     assert document["source"]["digest"] == PATCH.digest()
-
-
-def test_a_file_follows_the_umask_and_replaces_an_older_one(saved):
-    before = saved.stat().st_ino
-    DiffractionTable.load(saved).save(saved)
-    assert saved.stat().st_ino != before
-    umask = os.umask(0)
-    os.umask(umask)
-    assert stat.S_IMODE(saved.stat().st_mode) == 0o666 & ~umask
-    assert os.listdir(saved.parent) == ["table.exr"]
 
 
 # ------------------------------------------------------------------------ what is no table
@@ -228,26 +217,6 @@ def test_a_folder_in_place_of_the_file(table, tmp_path):
     (tmp_path / "table.exr").mkdir()
     with pytest.raises(DiffractionError, match="it is a folder; name a file in it"):
         table.save(tmp_path / "table.exr")
-
-
-def test_a_write_that_breaks_off_leaves_the_older_table(saved, monkeypatch):
-    before = saved.read_bytes()
-    table = DiffractionTable.load(saved)
-
-    class Interrupted:
-        def __init__(self, *_):
-            pass
-
-        def write(self, name):
-            with open(name, "wb") as file:
-                file.write(b"half a ta")
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(OpenEXR, "File", Interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        table.save(saved)
-    assert saved.read_bytes() == before
-    assert os.listdir(saved.parent) == [saved.name]
 
 
 def test_a_writer_that_loses_the_error_of_a_full_disk_is_found_out(tmp_path, monkeypatch):
