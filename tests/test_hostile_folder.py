@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.plugin import installed
 from tests.support import ROOT
 from tests.support.hostile import PRIVATE, SCENES, Folder, hostile_folder, run_in

@@ -14,7 +14,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, limits
 from mitsuba_diffraction.files import read_text, readable_file
-from mitsuba_diffraction.scene.load import set_variant
+from mitsuba_diffraction.scene import set_variant
 from tests.support import ROOT
 from tests.support.small_scenes import FILES
 

@@ -86,7 +86,7 @@ def test_readable_text_stays_as_it_is(text):
 
 
 def test_commands_that_messages_name_exist():
-    from mitsuba_diffraction.cli.main import build_parser
+    from mitsuba_diffraction.cli import build_parser
 
     (commands,) = (a.choices for a in build_parser()._actions if isinstance(a.choices, dict))
     # adjacent strings are one

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 from tests.support.pages import PAGES
 
 README = PAGES["README.md"]

@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.files import FileKind, kind_of
-from mitsuba_diffraction.heights.recipes import Recipe
+from mitsuba_diffraction.heights import Recipe
 from mitsuba_diffraction.scene.parameters import check_parameters, parameters_of
 from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
 

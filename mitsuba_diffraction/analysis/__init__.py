@@ -28,4 +28,4 @@ design         surfaces from their BRDF or colours, by gradients with respect to
 energy         albedo of a table's surface before and after energy conservation
 """
 
-__all__ = ["energy", "machine", "pictures", "timing"]
+__all__ = ["angular_variables", "energy", "machine", "observers", "pictures", "timing"]

@@ -17,4 +17,4 @@ from .frames import FrameRequest, FrameSequence, render
 from .jobs import build
 from .workers import connect
 
-__all__ = ["FrameRequest", "FrameSequence", "build", "connect", "render"]
+__all__ = ["FrameRequest", "FrameSequence", "build", "connect", "render", "tasks"]

@@ -20,13 +20,14 @@ from __future__ import annotations
 
 from .field import HeightField
 from .read import LoadOptions
+from .recipes import Recipe
 from .source import Source, load, treated
-from .spectra import order_powers
+from .spectra import dominant_periods, order_powers
 from .validity import GENTLE_SLOPE, STEEP_SLOPE, validity
 
 __all__ = [
-    "GENTLE_SLOPE", "STEEP_SLOPE", "HeightField", "LoadOptions", "Source", "coherence",
-    "order_powers",
+    "GENTLE_SLOPE", "STEEP_SLOPE", "HeightField", "LoadOptions", "Recipe", "Source",
+    "coherence", "dominant_periods", "order_powers",
 ]  # fmt: skip
 
 # Attached here: their modules import the class, so the class cannot import them.

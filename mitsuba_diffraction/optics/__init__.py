@@ -19,4 +19,7 @@ materials  names and numbers of materials; published indices of tissues
 display    linear sRGB to the values of a screen, by a view
 """
 
-__all__ = ["blend", "boundary", "colour", "display", "fresnel", "geometry", "mirror"]
+__all__ = [
+    "arithmetic", "blend", "boundary", "coat", "colour", "display", "fresnel", "geometry",
+    "materials", "mirror", "orders", "paths", "stack", "through",
+]  # fmt: skip

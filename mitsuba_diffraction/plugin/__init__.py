@@ -42,3 +42,5 @@ types           names of the types of arguments
 """
 
 import mitsuba  # noqa: F401 - before the modules here: the import registers them (`when_imported`)
+
+__all__ = ["description", "installed", "memory", "parameters", "presets"]

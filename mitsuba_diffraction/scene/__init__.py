@@ -30,4 +30,7 @@ from .load import load_scene, set_variant
 from .passes import Stop, render_passes
 from .pictures import read_exr
 
-__all__ = ["Stop", "hologram", "load_scene", "read_exr", "render_passes", "set_variant"]
+__all__ = [
+    "Stop", "frames", "hologram", "load_scene", "logo", "parameters", "passes", "pictures",
+    "read_exr", "render_passes", "set_variant", "stage",
+]  # fmt: skip

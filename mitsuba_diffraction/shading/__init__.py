@@ -8,3 +8,5 @@ dialects    words of GLSL and OSL
 powers      powers of a patch's orders as textures
 pair_power  power of a boundary model for a pair of directions, under a coat or bare
 """
+
+__all__ = ["dialects", "pair_power", "powers", "programs"]

@@ -25,12 +25,15 @@ from __future__ import annotations
 
 from .build.build import build_table
 from .build.spectrum import GLOSSY_RADIUS
-from .exr import load_table, save_table
+from .exr import load_table, save_table, write_channels
 from .lookup import brdf, window_sum
-from .source import TableSource
+from .source import TableRequest, TableSource, providing
 from .table import DiffractionTable
 
-__all__ = ["GLOSSY_RADIUS", "DiffractionTable", "TableSource"]
+__all__ = [
+    "GLOSSY_RADIUS", "DiffractionTable", "TableRequest", "TableSource", "directional", "powers",
+    "providing", "store", "window", "write_channels",
+]  # fmt: skip
 
 # Modules that build on the class; it shall not import them
 DiffractionTable.build = staticmethod(build_table)

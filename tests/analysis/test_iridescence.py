@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from mitsuba_diffraction import DiffractionError, HeightField, gratings
+from mitsuba_diffraction import DiffractionError, HeightField, bsdf_dict, gratings
 from mitsuba_diffraction.analysis.iridescence import (
     DiffractedLight,
     MaterialFactor,
@@ -17,7 +17,6 @@ from mitsuba_diffraction.analysis.iridescence import (
 from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.analysis.scans import bsdf_of
 from mitsuba_diffraction.optics.colour import response
-from mitsuba_diffraction.plugin.dictionary import bsdf_dict
 from mitsuba_diffraction.tables import DiffractionTable
 
 LIGHT = LightDirection(30.0, 0.0)

@@ -9,7 +9,7 @@ from mitsuba_diffraction import DiffractionError, HeightField
 from mitsuba_diffraction.analysis.crops import crops_of
 from mitsuba_diffraction.analysis.pictures import patches_figure
 from mitsuba_diffraction.analysis.tradeoff import lit_pairs
-from mitsuba_diffraction.heights.read import LoadOptions
+from mitsuba_diffraction.heights import LoadOptions
 
 
 def rough(shape, pixel_size):

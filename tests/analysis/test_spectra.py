@@ -20,7 +20,7 @@ from mitsuba_diffraction.analysis.spectra_files import (
     spectra_figure,
 )
 from mitsuba_diffraction.analysis.spectrometer import STEEPEST, MeasurementGeometry
-from tests.support.acceptance import spectra_and_reference
+from tests.analysis.acceptance import spectra_and_reference
 from tests.support.variants import obstacle
 
 LAM = np.array([420.0, 500.0, 580.0, 660.0])

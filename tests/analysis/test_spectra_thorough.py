@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.support.acceptance import spectra_and_reference
+from tests.analysis.acceptance import spectra_and_reference
 
 pytestmark = pytest.mark.thorough
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction import DiffractionError, HeightField, gratings
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.analysis import survey as module
 from mitsuba_diffraction.analysis.iridescence import light_and_chance
 from mitsuba_diffraction.analysis.maps.result import LightDirection
@@ -22,7 +22,6 @@ from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
-from mitsuba_diffraction.tables.table import DiffractionTable
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -205,18 +204,6 @@ def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path)
     mirror, disc, *scales = (row["iridescence"] for row in rows)
     assert mirror == 0.0
     assert 0.02 < np.mean(scales) < disc
-
-
-def test_gratings_of_two_directions_are_both_found():
-    n = 256
-    x, y = PIXEL * np.arange(n), PIXEL * np.arange(n)[:, None]
-    heights = 0.03 * np.sin(2 * np.pi * x / 1.3) + 0.02 * np.sin(2 * np.pi * y / 2.1)
-    from mitsuba_diffraction.heights.spectra import dominant_periods
-
-    one, other = dominant_periods(HeightField(heights, PIXEL))
-    assert (one.period, other.period) == pytest.approx((1.3, 2.1), rel=0.01)
-    assert (one.direction, other.direction) == pytest.approx((0.0, 90.0), abs=1.0)
-    assert (one.share, other.share) == pytest.approx((9 / 13, 4 / 13), abs=0.02)
 
 
 def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import warnings
-
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from docs.make.figures import tables
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.analysis import tradeoff
 from mitsuba_diffraction.analysis.tradeoff.accuracy import (
@@ -22,11 +18,8 @@ from mitsuba_diffraction.analysis.tradeoff.accuracy import (
 from mitsuba_diffraction.analysis.tradeoff.measuring import (
     MeasuredSetting,
     TradeoffSetting,
-    settings,
 )
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
-from mitsuba_diffraction.cli.main import build_parser
-from mitsuba_diffraction.cli.options import table_options
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -85,18 +78,6 @@ def test_a_budget_that_nothing_meets_is_refused_in_one_line():
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("quick", [False, True])
-def test_every_row_is_options_that_can_be_typed(quick):
-    """All that build a table take them: here the command that does nothing else."""
-    parser, names = build_parser(), []
-    for setting in settings(quick):
-        typed = [] if setting.name == "the defaults" else setting.name.split()
-        args = parser.parse_args(["precompute", "scale.npy", "-o", "table.exr", *typed])
-        assert table_options(args) == setting.arguments
-        names.append(setting.name)
-    assert len(set(names)) == len(names)
-
-
 def test_the_recommended_row_has_its_error_in_a_rendering(some_variant):
     chosen = [TradeoffSetting("default"), TradeoffSetting("tolerance", {"tolerance": 1e-2})]
     measured = tradeoff.measure(PATCH, chosen, coherence_width=WIDTH, lanes=64, rounds=1)
@@ -135,38 +116,3 @@ def test_fine_sums_are_better_than_coarse_ones_and_more_wavelengths_less_noisy(s
     found = measure_wavelengths(table, sample.wi, sample.wo)
     assert found.steps[2.0] < 0.1 < found.steps[40.0] + 0.1
     assert found.counts[1] > found.counts[4] > found.counts[16]
-
-
-def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
-    from mitsuba_diffraction.cli import tradeoff as command
-    from mitsuba_diffraction.cli.main import main
-
-    np.save(tmp_path / "heights.npy", PATCH.heights)
-    # errors of 16 pairs of directions scatter by half
-    monkeypatch.setattr(command, "QUICK", (48, 100, 256, 1, 1))
-    few = (
-        TradeoffSetting("default"),
-        TradeoffSetting("tolerance", {"tolerance": 1e-2}),
-    )
-    monkeypatch.setattr(tradeoff, "settings", lambda quick: iter(few))
-    heights = [str(tmp_path / "heights.npy"), "--pixel-size", "0.1"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        out = tmp_path / "out"
-        code = main(["tradeoff", *heights, "--quick", "--coherence-width", "4.5", "-o", str(out)])
-    assert code == 0
-    said = capsys.readouterr().out
-    assert "recommended (tolerance 0.001): " in said
-    document = json.loads((out / "tradeoff.json").read_text("utf-8"))
-    assert [record["setting"] for record in document["settings"]] == ["the defaults", COARSE]
-    assert all(0.0 < record["error"] <= 1e-2 for record in document["settings"])
-    assert (out / "tradeoff.csv").read_text("utf-8").startswith("group,setting,")
-    page, images = tmp_path / "page.md", tmp_path / "images"
-    page.write_text("<!-- begin settings -->\nstale\n<!-- end settings -->\n", "utf-8")
-    images.mkdir()
-    assert tables.main(["tradeoff", str(out), "-o", str(page), "--images", str(images)]) == 0
-    assert f"| {COARSE} | {document['settings'][1]['error']:.1e} |" in page.read_text("utf-8")
-    for name in ("tradeoff.png", "depth.png"):
-        assert (images / name).read_bytes() == (out / name).read_bytes()
-    assert tables.main(["tradeoff", str(images), "-o", str(page)]) == 1
-    assert "is not what tradeoff writes" in capsys.readouterr().err

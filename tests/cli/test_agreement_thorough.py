@@ -10,9 +10,9 @@ import OpenEXR
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.analysis.spectra import brdf_values
 from mitsuba_diffraction.optics.colour import response
 from tests.support.directions import polar
+from tests.support.lanes import brdf_values
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("here")]
 

@@ -11,8 +11,6 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.analysis.maps.picture import ATTRIBUTE
-
 pytestmark = pytest.mark.usefixtures("here", "spectral")
 
 # A map of the grating of `heights` that takes half a second.
@@ -22,7 +20,7 @@ QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "32",
 def channels_of(file):
     """Channels of an EXR by name, and its description."""
     exr = OpenEXR.File(str(file), separate_channels=True)
-    return {n: c.pixels for n, c in exr.channels().items()}, json.loads(exr.header()[ATTRIBUTE])
+    return {n: c.pixels for n, c in exr.channels().items()}, json.loads(exr.header()["brdf_map"])
 
 
 def test_an_exr_and_a_picture_are_written_and_named(run, heights, here):

@@ -35,7 +35,7 @@ SOON = 120
 STUCK = """
 import ctypes
 from mitsuba_diffraction.atomic import atomic_path
-from mitsuba_diffraction.heights.source import Source
+from mitsuba_diffraction.heights import Source
 
 def read(*_):
     with atomic_path("out.exr"):
@@ -127,12 +127,12 @@ def test_ctrl_c_while_the_package_is_imported_is_no_traceback(entry, slow, tmp_p
 def test_what_a_plugin_raises_while_a_scene_loads_is_not_swallowed(
     run, tmp_path, monkeypatch, some_variant, raised, code, text
 ):
-    from mitsuba_diffraction.plugin import diffraction
+    from mitsuba_diffraction.plugin import parameters
 
     def read(*_: object) -> None:
         raise eval(raised)
 
-    monkeypatch.setattr(diffraction.read, "nested_of", read)
+    monkeypatch.setattr(parameters, "nested_of", read)
     scene = tmp_path / "a.xml"
     scene.write_text(
         '<scene version="3.0.0"><shape type="sphere"><bsdf type="diffraction"/></shape></scene>'

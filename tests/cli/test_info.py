@@ -79,14 +79,6 @@ def test_a_damaged_table_is_one_line(run, table, capfd):
         assert capfd.readouterr() == ("", "")
 
 
-def test_a_table_of_another_format_version_is_one_line(run, table, monkeypatch):
-    from mitsuba_diffraction.tables import exr
-
-    written = exr.FORMAT_VERSION
-    monkeypatch.setattr(exr, "FORMAT_VERSION", 99)
-    assert f"format version {written}" in run("info", table).failed_in_one_line()
-
-
 def test_an_exr_that_is_no_table_is_heights(run, tmp_path):
     import OpenEXR
 

@@ -127,7 +127,7 @@ def test_a_name_that_is_no_utf_8_is_refused_in_one_line(run, here, command):
 
 def test_loading_a_scene_whose_name_is_no_utf_8_is_refused(here):
     from mitsuba_diffraction import DiffractionError
-    from mitsuba_diffraction.scene.load import load_scene
+    from mitsuba_diffraction.scene import load_scene
 
     file = Path(os.fsdecode(b"caf\xe9.xml"))
     file.write_text(SCENE.format(""))

@@ -1,10 +1,11 @@
-"""Without a terminal a long command says regularly how far it is, and not otherwise."""
+"""Lines on stderr: how far a long command is, and Mitsuba's warnings."""
 
 from __future__ import annotations
 
 import argparse
 import time
 
+import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction.cli import console
@@ -29,3 +30,14 @@ def test_short_work_is_silent(capfd):
     with console.Bar(argparse.Namespace(progress=None)) as bar:
         bar(1, 1, "reading")
     assert capfd.readouterr().err == ""
+
+
+def test_mitsuba_s_warnings_are_ours_and_said_once(capfd):
+    mi.set_variant("scalar_rgb")
+    count = mi.logger().appender_count()
+    with console.mitsuba_warnings():
+        for _ in range(2):
+            mi.Log(mi.LogLevel.Warn, "too few\nsamples")
+        mi.Log(mi.LogLevel.Info, "of no interest")
+    assert capfd.readouterr().err.splitlines() == ["mitsuba-diffraction: warning: too few samples"]
+    assert mi.logger().appender_count() == count

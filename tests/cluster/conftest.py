@@ -10,9 +10,8 @@ pytest.importorskip("distributed")
 
 from mitsuba_diffraction import cluster
 from mitsuba_diffraction.cluster import groups, tasks
-from mitsuba_diffraction.scene import passes
-from mitsuba_diffraction.scene.load import load_scene, set_variant
-from tests.support.clusters import SPP, VARIANT, silent
+from mitsuba_diffraction.scene import load_scene, passes, set_variant
+from tests.cluster.clusters import SPP, VARIANT, silent
 from tests.support.kernels import vectors_of
 from tests.support.room import SCENE
 

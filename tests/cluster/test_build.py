@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 
 import numpy as np
 import pytest
@@ -13,12 +12,7 @@ distributed = pytest.importorskip("distributed")
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import jobs as jobs_module  # noqa: E402
 from mitsuba_diffraction.cluster.jobs import OrderedMap  # noqa: E402
-from mitsuba_diffraction.settings import TableSettings  # noqa: E402
-from mitsuba_diffraction.tables.build import screens as screens_module  # noqa: E402
-from mitsuba_diffraction.tables.build.screens import Screens  # noqa: E402
 from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
-
-WANTED = TableSettings(**SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -30,28 +24,6 @@ def scan():
 def alone(scan):
     """The table that this process builds by itself."""
     return DiffractionTable.build(scan, **SETTINGS)
-
-
-def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, monkeypatch):
-    monkeypatch.setattr(screens_module, "BATCH_POINTS", 1)
-    whole = Screens([scan], 12.0, 14.0)
-    batches = whole.batches()
-    assert len(batches) == len(whole) == 8
-    sent = [pickle.loads(pickle.dumps(batch)) for batch in batches]
-    for n, batch in enumerate(sent):
-        assert batch.scans[0].shape == whole.shape
-        np.testing.assert_array_equal(batch[0].heights, whole[n].heights)
-
-
-def test_batches_are_of_neighbours_and_hold_every_window_once(scan, monkeypatch):
-    ny, nx = Screens([scan], 6.0, 7.0).shape
-    monkeypatch.setattr(screens_module, "BATCH_POINTS", 3 * ny * nx)
-    whole = Screens([scan, scan], 6.0, 7.0)
-    batches = whole.batches()
-    assert {len(batch) for batch in batches} <= {1, 2, 3}
-    found = [batch[n].heights for batch in batches for n in range(len(batch))]
-    np.testing.assert_array_equal(found, [one.heights for one in whole])
-    assert max(b.__getstate__()["scans"][0].heights.size for b in batches) <= 3.01 * ny * nx
 
 
 class _Workers:

@@ -20,9 +20,10 @@ pytest.importorskip("distributed")
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import groups, workers  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task  # noqa: E402
-from mitsuba_diffraction.scene.passes import Span, Stop  # noqa: E402
+from mitsuba_diffraction.scene import Stop  # noqa: E402
+from mitsuba_diffraction.scene.passes import Span  # noqa: E402
+from tests.cluster.clusters import VARIANT, film, passes_of_picture, rendered, silent  # noqa: E402
 from tests.support import ROOT  # noqa: E402
-from tests.support.clusters import VARIANT, film, passes_of_picture, rendered, silent  # noqa: E402
 from tests.support.room import SCENE  # noqa: E402
 
 

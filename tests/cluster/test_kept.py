@@ -12,7 +12,7 @@ pytest.importorskip("distributed")
 from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import run_task  # noqa: E402
 from mitsuba_diffraction.scene.passes import Span  # noqa: E402
-from tests.support.clusters import passes_of_picture  # noqa: E402
+from tests.cluster.clusters import passes_of_picture  # noqa: E402
 
 FIRST, SECOND = Span(0, 1), Span(1, 1)
 

@@ -18,8 +18,9 @@ from mitsuba_diffraction.cluster import groups  # noqa: E402
 from mitsuba_diffraction.cluster.frames import FrameRequest  # noqa: E402
 from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import run_task  # noqa: E402
-from mitsuba_diffraction.scene.passes import Span, Stop  # noqa: E402
-from tests.support.clusters import SPP, VARIANT, Recorder, film, rendered, silent  # noqa: E402
+from mitsuba_diffraction.scene import Stop  # noqa: E402
+from mitsuba_diffraction.scene.passes import Span  # noqa: E402
+from tests.cluster.clusters import SPP, VARIANT, Recorder, film, rendered, silent  # noqa: E402
 from tests.support.room import SCENE, pixels  # noqa: E402
 
 

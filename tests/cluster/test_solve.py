@@ -14,13 +14,13 @@ pytestmark = pytest.mark.thorough
 pytest.importorskip("distributed")
 pytest.importorskip("gratinglab")
 
+from mitsuba_diffraction import solve_orders  # noqa: E402
 from mitsuba_diffraction.cli import main  # noqa: E402
 from mitsuba_diffraction.cluster.workers import executor_of  # noqa: E402
 from mitsuba_diffraction.orders import OrderTable  # noqa: E402
+from mitsuba_diffraction.orders.solve import Settings  # noqa: E402
 from mitsuba_diffraction.orders.solve.jobs import Jobs  # noqa: E402
-from mitsuba_diffraction.orders.solve.orders import solve_orders  # noqa: E402
 from mitsuba_diffraction.orders.solve.profiles import sinusoidal  # noqa: E402
-from mitsuba_diffraction.orders.solve.settings import Settings  # noqa: E402
 from tests.support import ROOT  # noqa: E402
 from tests.support.orders import digest_in_file  # noqa: E402
 

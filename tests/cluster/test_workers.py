@@ -17,8 +17,8 @@ distributed = pytest.importorskip("distributed")
 
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import workers  # noqa: E402
+from tests.cluster.clusters import VARIANT, Recorder, film, rendered  # noqa: E402
 from tests.support import ROOT  # noqa: E402
-from tests.support.clusters import VARIANT, Recorder, film, rendered  # noqa: E402
 
 
 @pytest.mark.parametrize("number", range(3))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables.colour import ColourTable
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.document import from_record, to_record
 from mitsuba_diffraction.tables.energy.conservation import Conservation

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli import build_parser, main
 from tests.fuzz.damage import originals
 
 #: Take minutes at their smallest, or open a window.

@@ -13,9 +13,9 @@ import numpy as np
 from PIL import Image
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.heights.recipes import Recipe
-from mitsuba_diffraction.scene.load import load_scene
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
+from mitsuba_diffraction.heights import Recipe
+from mitsuba_diffraction.scene import load_scene
+from mitsuba_diffraction.scene.orientation import load_mesh
 from mitsuba_diffraction.tables.document import parse_document, shape_of, with_coefficients
 from tests.support.damage import mutate
 from tests.support.directions import rough_patch

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.io import netcdf_file
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.orders.solve import SolvedRecipe
 from mitsuba_diffraction.orders.solve.profiles import read_profile
-from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 from tests.fuzz.damage import check_line, damaged
 from tests.support.orders import thin_grating
 

@@ -10,8 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights import field as field_module
 from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.heights.validity import tilted
 from mitsuba_diffraction.limits import MOST_PIXELS
+from tests.support.scans import PIXEL, rough
 
 FLAT = np.zeros((3, 4))
 
@@ -163,3 +166,20 @@ def test_any_pixel_size_works_or_is_one_clear_line(value):
         assert "\n" not in str(error)
     else:
         assert min(field.pixel_size) > 0
+
+
+def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
+    heights = rough(300).astype(np.float32)
+    np.save(tmp_path / "scan.npy", heights)
+    whole = HeightField.load(tmp_path / "scan.npy", pixel_size=PIXEL)
+    monkeypatch.setattr(field_module, "LARGE", 1)
+    parts = HeightField.load(tmp_path / "scan.npy", pixel_size=PIXEL)
+    np.testing.assert_array_equal(parts.heights, heights)
+    assert parts.rms_slope == pytest.approx(whole.rms_slope, rel=1e-12)
+    assert parts.rms_height == pytest.approx(whole.rms_height, rel=1e-12)
+    level = parts.treated(level="plane")
+    assert "RMS change" in level.history[-1]
+    tilt = tilted(parts, 0.4)
+    monkeypatch.undo()
+    assert level.history == whole.treated(level="plane").history
+    assert tilt is tilted(whole, 0.4)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import OpenEXR
-import pytest
 from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, HeightField
-from tests.support.systems import posix
 
 
 def test_loading_in_threads_leaves_the_streams_of_the_process_alone(tmp_path):
@@ -37,21 +34,3 @@ def test_loading_in_threads_leaves_the_streams_of_the_process_alone(tmp_path):
     assert all(seen)
     assert (sys.stdout, sys.stderr) == streams
     assert os.fstat(2).st_ino == number
-
-
-@posix
-@pytest.mark.parametrize("name", ["pipe.npy", "pipe.toml", "pipe"])
-def test_a_pipe_is_refused_at_once(tmp_path, name):
-    os.mkfifo(tmp_path / name)
-    before = signal.signal(signal.SIGALRM, _waits)
-    signal.alarm(20)
-    try:
-        with pytest.raises(DiffractionError, match="is a pipe or a device"):
-            HeightField.load(tmp_path / name)
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
-
-
-def _waits(*_: object) -> None:
-    pytest.fail("it waits for somebody to write into the pipe")

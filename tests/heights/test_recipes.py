@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.recipes import LOAD_KEYS, Recipe
+from mitsuba_diffraction.heights.recipes import _KEYS, LOAD_KEYS, Recipe
 from mitsuba_diffraction.heights.source import Source
 from mitsuba_diffraction.settings import RECIPE_SETTINGS
+from tests.support.pages import first_columns
 
 PRECOMPUTE = Path(__file__).resolve().parent.parent.parent / "precompute"
 HEIGHTS = 0.01 * np.random.default_rng(6).random((8, 9))
@@ -206,3 +207,8 @@ def test_random_recipes_load_or_are_one_clear_line(folder, content):
         Source.of(path).fields()
     except DiffractionError as error:
         assert "\n" not in str(error)
+
+
+def test_keys_of_recipes_are_listed():
+    keys = {*_KEYS} - {"arguments"}
+    assert any(names - {"arguments"} == keys for names in first_columns("docs/own-scene.md"))

@@ -1,24 +1,79 @@
-"""Stacks: the mean over a spread of thicknesses, and its phase."""
+"""Stacks: transfer matrices, limits, and the mean over a spread of thicknesses."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.testing import assert_allclose
+import pytest
 
-from mitsuba_diffraction.optics import stack
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.fresnel import Filmed
+from mitsuba_diffraction.optics.stack import amplitudes, mean_powers
+
+COSINES = np.cos(np.radians([0.0, 20, 45, 70, 88]))
+LAM = np.array([400.0, 550, 700])
+#: Gold, then a high, a low and an absorbing index upwards; nm.
+INDICES = np.array([0.3 + 2.5j, 2.3, 1.38, 1.6 + 0.05j])[:, None] * np.ones(3)
+THICK = np.array([60.0, 130.0, 90.0])
 
 
 def test_a_mean_over_a_spread_is_the_integral_over_a_gaussian_of_thicknesses():
     cosine, lam, spread = np.array([0.3, 0.9]), np.array([450.0, 640.0]), 0.1
     indices = np.array([[0.9 + 6.0j] * 2, [1.5] * 2, [2.3 + 0.01j] * 2, [1.4] * 2])
     thicknesses = np.array([90.0, 60.0, 110.0])
-    found = stack.mean_powers(cosine, lam, indices, thicknesses, spread)
+    found = mean_powers(cosine, lam, indices, thicknesses, spread)
     places = np.linspace(-5.0, 5.0, 101)
     weights = np.exp(-0.5 * places**2) / np.exp(-0.5 * places**2).sum()
     expected = np.zeros_like(found)
     for place, weight in zip(places, weights, strict=True):
-        s, p = stack.amplitudes(cosine, lam, indices, (1.0 + spread * place) * thicknesses)
+        s, p = amplitudes(cosine, lam, indices, (1.0 + spread * place) * thicknesses)
         expected += weight * np.stack([np.abs(s) ** 2, np.abs(p) ** 2, p * s.conj()], axis=-1)
     assert np.abs(expected[..., 2].imag).min() > 0.01
     # the mean ends at three standard deviations
-    assert_allclose(found, expected, atol=3e-3)
+    np.testing.assert_allclose(found, expected, atol=3e-3)
+
+
+def test_reflection_is_that_of_transfer_matrices():
+    tmm = pytest.importorskip("tmm")
+    r_s, r_p = amplitudes(COSINES, LAM, INDICES, THICK)
+    depths = [np.inf, *THICK[::-1], np.inf]
+    for n, lam in enumerate(LAM):
+        for m, cosine in enumerate(COSINES):
+            column = [1.0, *INDICES[::-1, n]]
+            r = [tmm.coh_tmm(p, column, depths, np.arccos(cosine), lam)["r"] for p in "sp"]
+            # rounding
+            assert [r_s[n, m], r_p[n, m]] == pytest.approx(r, abs=1e-9)
+
+
+def test_one_layer_is_a_film():
+    got = amplitudes(COSINES, LAM, INDICES[:2], THICK[:1])
+    for n, lam in enumerate(LAM):
+        film = Filmed(INDICES[0, n], INDICES[1, n], 2 * np.pi * THICK[0] / lam)
+        expected = reference.fresnel.amplitudes(COSINES, film)
+        np.testing.assert_allclose([part[n] for part in got], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("between", [False, True])
+def test_a_gap_of_the_medium_above_is_the_limit_of_its_index(between):
+    """Where an index is that of the next layer, all is 0 at the horizon but the sum."""
+    cosines = np.linspace(0.0, 1.0, 33)
+    layers = [INDICES[0], 1.5 * np.ones(3)] if between else [INDICES[0]]
+
+    def stack(gap):
+        indices = np.stack([*layers, gap * np.ones(3)])
+        return amplitudes(cosines, LAM, indices, THICK[: len(indices) - 1])
+
+    for exact, near in zip(stack(1.0), stack(1.0 + 1e-9), strict=True):
+        assert np.isfinite(exact).all()
+        # the root of 2e-9 at the horizon
+        np.testing.assert_allclose(exact[:, 1:], near[:, 1:], atol=1e-4)
+
+
+@pytest.mark.parametrize("pairs", [0, 1, 4])
+def test_quarter_waves_reflect_as_published(pairs):
+    """Zinc sulphide and cryolite on glass: Born and Wolf, section 1.6.5, eq. 95."""
+    high, low, glass, lam = 2.3, 1.35, 1.52, 546.0
+    layers = [high] + [low, high] * pairs
+    indices = np.array([glass, *layers])[:, None]
+    r_s, _ = amplitudes(np.ones(1), np.array([lam]), indices, lam / (4 * np.array(layers)))
+    x = high * (high / glass) * (high / low) ** (2 * pairs)
+    assert abs(r_s[0, 0]) ** 2 == pytest.approx(((1 - x) / (1 + x)) ** 2, abs=1e-12)

@@ -17,7 +17,7 @@ from scipy.ndimage import map_coordinates
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.osl.export import pigment_of
+from mitsuba_diffraction.osl.export import OSL, pigment_of, shader_of
 from mitsuba_diffraction.osl.patch import (
     BANDS,
     energy_texture,
@@ -28,6 +28,7 @@ from mitsuba_diffraction.osl.patch import (
 from mitsuba_diffraction.plugin.description import Quantity, Surface
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.tables.powers import powers_at
+from tests.support.descriptions import CHANGES, ELSEWHERE, base
 from tests.support.patches import DEEP, DEFAULTS, PATCH, SMALL_SCAN
 
 
@@ -191,3 +192,17 @@ def test_a_pigment_is_grey_in_a_mono_variant():
     mi.set_variant("llvm_ad_mono")
     nested = mi.load_dict({"type": "diffuse", "reflectance": 0.25})
     assert pigment_of(dataclasses.replace(ENERGETIC, nested=nested)) == (0.25, 0.25, 0.25)
+
+
+def exported_of(described: Surface) -> object:
+    if described.nested is not None:
+        described = dataclasses.replace(described, nested=mi.load_dict({"type": "diffuse"}))
+    shader = shader_of(described)
+    arrays = {name: pixels.tobytes() for name, pixels in shader.textures.items()}
+    return shader.formulas, shader.constants, list(shader.arrays), shader.sockets, arrays
+
+
+def test_every_feature_that_is_shown_changes_what_is_exported(some_variant):
+    plain = exported_of(base())
+    for feature in OSL.shows - ELSEWHERE:
+        assert exported_of(dataclasses.replace(base(), **CHANGES[feature])) != plain, feature

@@ -93,12 +93,6 @@ def test_document_names_files_and_sockets(tmp_path, some_variant):
     assert not [path for path in exported.document.parent.iterdir() if path.name.startswith(".")]
 
 
-def test_sheets_are_refused(tmp_path, some_variant):
-    sheet = thin_grating(0.6, counts=(2, 2, 1), thin=True)
-    with pytest.raises(DiffractionError, match="light that goes through, which OSL cannot show"):
-        md.osl.export(mi.load_dict(md.bsdf_dict(sheet)), tmp_path)
-
-
 def test_folder_is_no_part_of_what_is_written(tmp_path, some_variant):
     folder = tmp_path / 'z", float Evil = 1, string Q = "'
     exported = md.osl.export(mi.load_dict(md.bsdf_dict(OrderTable.mirror(1.0))), folder, "cd")

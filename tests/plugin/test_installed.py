@@ -12,7 +12,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.plugin.conductors import tabulated_index
 from mitsuba_diffraction.plugin.materials import Conductor
-from mitsuba_diffraction.scene.load import load_scene
+from mitsuba_diffraction.scene import load_scene
 from tests.support.hostile import other_metals, plugins_in
 
 pytestmark = pytest.mark.usefixtures("some_variant")

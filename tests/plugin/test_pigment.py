@@ -13,21 +13,12 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.materials import METALS, TISSUES
 from mitsuba_diffraction.plugin.conductors import tabulated_range
 from mitsuba_diffraction.plugin.pigment import pigment_bsdf, pigment_range
-from tests.support.variants import obstacle
 
 FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
-SPECTRUM = "llvm_ad_spectral"
 
 
 def test_plain_names_are_tabulated_conductors(some_variant):
     assert all(tabulated_range(symbol) for symbol in METALS.values())
-
-
-@pytest.fixture
-def spectral():
-    if reason := obstacle(SPECTRUM):
-        pytest.skip(reason)
-    mi.set_variant(SPECTRUM)
 
 
 @pytest.mark.parametrize("name", TISSUES)

@@ -8,7 +8,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.files import FileKind, kind_of
-from mitsuba_diffraction.heights.recipes import Recipe
+from mitsuba_diffraction.heights import Recipe
 from mitsuba_diffraction.plugin.parameters import NAMES
 from mitsuba_diffraction.plugin.presets import find_preset, presets
 

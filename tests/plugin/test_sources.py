@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.heights.read import LoadOptions
-from mitsuba_diffraction.tables.source import providing
+from mitsuba_diffraction.heights import LoadOptions
+from mitsuba_diffraction.tables import providing
 from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.patches import DEFAULTS, PATCH
 

@@ -22,7 +22,7 @@ from mitsuba_diffraction.plugin.energy import _excess_of, reflectors_of
 from mitsuba_diffraction.plugin.energy_factors import ScaleRange
 from mitsuba_diffraction.plugin.power import power_model
 from mitsuba_diffraction.plugin.series import series_of
-from mitsuba_diffraction.tables.colour.table import cached_colours
+from mitsuba_diffraction.tables.colour import cached_colours
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy
 from tests.support.directions import rough_patch

@@ -12,7 +12,7 @@ import pytest
 from mitsuba_diffraction import DiffractionTable, HeightField, bsdf_dict, gratings, reference
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, delta_e, linear_srgb, response
 from mitsuba_diffraction.plugin import materials
-from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables.colour import ColourTable
 from tests.support.directions import Array, polar
 from tests.support.lanes import interaction, spectra, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs

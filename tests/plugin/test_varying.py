@@ -7,8 +7,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.elements import check_attributes
 from tests.support.directions import polar
 from tests.support.gentle import UV, bitmap, directions, hits, load, pairs
 from tests.support.lanes import vectors
@@ -87,8 +85,6 @@ def test_a_mesh_attribute_is_read(name, channels, values, number):
     parameters["vertex_texcoords"] = [0, 0, 1, 0, 0, 1]
     parameters["faces"] = [0, 1, 2]
     parameters.update()
-    with pytest.raises(DiffractionError, match="no attribute vertex_worn"):
-        check_attributes(mesh)
     mesh.add_attribute("vertex_worn", channels, values)
     scene = mi.load_dict({"type": "scene", "plate": mesh})
     si = scene.ray_intersect(mi.Ray3f([1.0, 1.0, 1.0], [0.0, 0.0, -1.0]))
@@ -98,13 +94,3 @@ def test_a_mesh_attribute_is_read(name, channels, values, number):
         found = mesh.bsdf().eval(mi.BSDFContext(), si, wo)[0][0]
         constant = load(**{name: number}).eval(mi.BSDFContext(), si, wo)[0][0]
         assert found == pytest.approx(constant, rel=0.01)  # two tables of the same orders
-
-
-def test_a_mesh_attribute_that_is_not_positive_is_refused():
-    props = mi.Properties()
-    attribute = {"type": "mesh_attribute", "name": "vertex_period"}
-    props["bsdf"] = load(lateral_scale=attribute, lateral_scale_max=1.0)
-    mesh = mi.Mesh("plate", 3, 1, has_vertex_texcoords=True, props=props)
-    mesh.add_attribute("vertex_period", 1, [0.5, 1.0, 0.0])
-    with pytest.raises(DiffractionError, match="vertex_period, whose least number is 0"):
-        check_attributes(mesh)

@@ -6,9 +6,9 @@ import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction import DiffractionError, bsdf_dict
-from mitsuba_diffraction.realtime.glsl.scene import read_scene
 from mitsuba_diffraction.scene.elements import check_attributes, name_of, own_id
 from tests.support.directions import rough_patch
+from tests.support.gentle import load
 
 PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)
 ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}
@@ -51,18 +51,14 @@ def test_places_need_uv_coordinates():
         check_attributes(mesh)
 
 
-def test_the_realtime_renderer_asks_as_well():
-    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
-    scene = mi.load_dict({"type": "scene", "plate": plate("vertex_orientation"), "s": sensor})
-    with pytest.raises(DiffractionError, match="no attribute vertex_orientation"):
-        read_scene(scene)
-
-
-def test_the_realtime_renderer_refuses_places():
-    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
-    disk = {"type": "disk", "bsdf": bsdf_dict(PATCH, **ON_SURFACE)}
-    with pytest.raises(DiffractionError, match=r"coherence='surface'"):
-        read_scene(mi.load_dict({"type": "scene", "disk": disk, "s": sensor}))
+def test_a_mesh_attribute_that_is_not_positive_is_refused():
+    props = mi.Properties()
+    attribute = {"type": "mesh_attribute", "name": "vertex_period"}
+    props["bsdf"] = load(lateral_scale=attribute, lateral_scale_max=1.0)
+    mesh = mi.Mesh("plate", 3, 1, has_vertex_texcoords=True, props=props)
+    mesh.add_attribute("vertex_period", 1, [0.5, 1.0, 0.0])
+    with pytest.raises(DiffractionError, match="vertex_period, whose least number is 0"):
+        check_attributes(mesh)
 
 
 class Element:

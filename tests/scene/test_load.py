@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import warnings
 
-import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
-from mitsuba_diffraction.cli.console import mitsuba_warnings
 from mitsuba_diffraction.scene.load import load_scene, plain_text
 
 BSDF = (
@@ -143,14 +141,3 @@ def test_errors_say_where_and_what(text):
 @given(st.text())
 def test_any_error_is_one_line(text):
     assert len(plain_text(RuntimeError(text)).splitlines()) <= 1
-
-
-def test_mitsuba_s_warnings_are_ours_and_said_once(capfd):
-    mi.set_variant("scalar_rgb")
-    count = mi.logger().appender_count()
-    with mitsuba_warnings():
-        for _ in range(2):
-            mi.Log(mi.LogLevel.Warn, "too few\nsamples")
-        mi.Log(mi.LogLevel.Info, "of no interest")
-    assert capfd.readouterr().err.splitlines() == ["mitsuba-diffraction: warning: too few samples"]
-    assert mi.logger().appender_count() == count

@@ -147,7 +147,7 @@ def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
         if done == 2:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
+    monkeypatch.setattr("mitsuba_diffraction.cli.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-s", "50", "-o", "a.exr")
     assert ran.code == 130
     assert ran.err.splitlines() == [
@@ -159,7 +159,7 @@ def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
 
 def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
     monkeypatch.setattr(
-        "mitsuba_diffraction.cli.console.Bar.__call__",
+        "mitsuba_diffraction.cli.Bar.__call__",
         lambda *_: signal.raise_signal(signal.SIGINT),
     )
     assert run("render", scene, *QUICK, "-o", "a.exr").code == 130
@@ -171,7 +171,7 @@ def test_ctrl_c_while_compiling_writes_nothing(run, scene, monkeypatch):
         if text == "compiling":
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
+    monkeypatch.setattr("mitsuba_diffraction.cli.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-o", "a.exr")
     assert ran.code == 130
     assert "no half-written" in ran.err

@@ -20,7 +20,7 @@ def test_orders_fall_where_the_equation_says(incidence: float, orders: tuple[int
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_diffraction.scene.load import load_scene
+    from mitsuba_diffraction.scene import load_scene
 
     given = {"incidence": f"{incidence}", "ambient": "1e-6"} | {
         "resx": "320", "resy": "150", "spp": "32", "shortest": "531.9", "longest": "532.1",

@@ -62,7 +62,7 @@ def on_film(sensor: object, points: np.ndarray) -> np.ndarray:
 def test_orders_fall_where_the_equation_says_and_are_as_bright_as_listed(table: Path) -> None:
     import mitsuba as mi
 
-    from mitsuba_diffraction.scene.load import load_scene
+    from mitsuba_diffraction.scene import load_scene
 
     parameters = {
         "material:rulings": str(table), "incidence": str(INCIDENCE), "tilt": str(TILT),

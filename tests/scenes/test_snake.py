@@ -14,8 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
-from mitsuba_diffraction.scene.orientation.trimesh import texture_tangents
+from mitsuba_diffraction.scene.orientation import load_mesh, texture_tangents
 from scenes.make.__main__ import elaphe, main, xenopeltis
 from scenes.make.anatomy import Anatomy
 from scenes.make.scales import Scales

@@ -1,10 +1,12 @@
-"""Coarse conservation of energy, for tests that do not ask how good it is.
+"""Coarse conservation of energy and little light between surfaces, for tests that ask for neither.
 
 Conservation of energy at few wavelengths and directions is for what does not ask how good it is: it
 is seconds of work for each table, material and film, and a fraction of that here.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 
@@ -28,3 +30,17 @@ COARSE = EnergySettings(
 def coarse_energy() -> EnergySettings:
     """Conserve energy coarsely in this process from now on; return the settings before."""
     return use_energy_settings(COARSE)
+
+
+#: Points and cells of the light between surfaces, and height scales of pages, as powers of 2.
+_LITTLE = {
+    "mitsuba_diffraction.realtime.glsl.bounces._POINTS": 1 << 8,
+    "mitsuba_diffraction.realtime.glsl.surroundings._CELLS": 1 << 16,
+    "mitsuba_diffraction.realtime.web.export.OCTAVES": (0.0,),
+}
+
+
+def little_light(setattr_of: Callable[[str, object], None]) -> None:
+    """Make what commands of the realtime room compute small, by `monkeypatch.setattr`."""
+    for name, value in _LITTLE.items():
+        setattr_of(name, value)

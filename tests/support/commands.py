@@ -20,6 +20,7 @@ from scenes.make.__main__ import main as make_mesh
 from tests.support import crossed
 from tests.support.boxes import write_boxes
 from tests.support.clone import small_clone
+from tests.support.coarse import little_light
 from tests.support.instruments import nanoscope
 from tests.support.logos import drawn, write_board
 from tests.support.pages import blocks, spans, typed
@@ -185,10 +186,7 @@ def small_tree(folder: Path) -> Path:
 
 def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Run a page's commands in a folder of `small_tree`."""
-    # of height scales that a page may be asked for, one
-    monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (0.0,))
-    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.bounces._POINTS", 1 << 8)
-    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.surroundings._CELLS", 1 << 16)
+    little_light(monkeypatch.setattr)
     # a process for each `solve` would take longer to start than to solve
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
     monkeypatch.chdir(tree)

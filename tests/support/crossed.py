@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import functools
+import tempfile
 from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import jv
 
+from mitsuba_diffraction import OrderTable, read_orders
 from mitsuba_diffraction.optics.orders import crossed_square, order_factor
-from mitsuba_diffraction.orders import OrderTable
-from mitsuba_diffraction.orders.imported import imported_table
-from mitsuba_diffraction.orders.lists import Efficiencies
 
 PERIODS, RANGE = (0.8, 1.1), (450.0, 650.0)
 #: Reflectance; and amplitudes of the sine waves along x and y, µm.
 REFLECTANCE, DEPTHS = 0.8, (0.03, 0.015)
 #: Of the clear material.
 INDEX = 1.5
+
+
+class Efficiencies(NamedTuple):
+    """Efficiencies (a, b, c, m, 2) of light (a,), (b,), (c,) and orders (m, 2); NaN: none."""
+
+    wavelengths: np.ndarray
+    theta: np.ndarray
+    phi: np.ndarray
+    orders: np.ndarray
+    values: np.ndarray
 
 
 def efficiency(x, y, wavelength, m, n):
@@ -56,8 +67,7 @@ def listed(theta, phi, wavelengths, of_order=efficiency):
 def table() -> OrderTable:
     """Its table."""
     grid = listed(np.arange(0.0, 86.0, 5.0), np.arange(0.0, 360.0, 15.0), np.arange(450, 651, 20.0))
-    header = {"solver": "closed form", "material": "mirror", "profile": "sine waves"}
-    return imported_table(grid, PERIODS, 1.0, "the closed form", header)
+    return _imported(grid)
 
 
 @functools.cache
@@ -67,8 +77,14 @@ def clear_table() -> OrderTable:
         np.arange(0.0, 89.0, 8.0), np.arange(0.0, 360.0, 20.0), [450.0, 550.0, 650.0],
         clear_efficiency,
     )  # fmt: skip
-    made = imported_table(grid, PERIODS, 1.0, "the closed form", {"profile": "sine waves"})
+    made = _imported(grid)
     return replace(made, response=replace(made.response, index=INDEX))
+
+
+def _imported(grid: Efficiencies) -> OrderTable:
+    with tempfile.TemporaryDirectory() as folder:
+        save_csv(grid, Path(folder, "sine_waves.csv"))
+        return read_orders(Path(folder, "sine_waves.csv"), PERIODS)
 
 
 def save_csv(grid: Efficiencies, path) -> None:

@@ -12,7 +12,6 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import mitsuba as mi
 import numpy as np
 from PIL import Image
@@ -27,12 +26,11 @@ _SIZE, _PAGE, _BEFORE = 1 << 16, 4096, b"what was there before"
 def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
     """Return functions that write small files by name; frames of films lie in `scratch`."""
     from mitsuba_diffraction.analysis.export.rgl import DEFAULT, save_rgl
-    from mitsuba_diffraction.cli.report import save_figure, save_json
+    from mitsuba_diffraction.cli import save_json
     from mitsuba_diffraction.scene.frames import FILMS, write_film
-    from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
-    from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
+    from mitsuba_diffraction.scene.orientation import TriangleMesh, write_ply
     from mitsuba_diffraction.scene.pictures import write_exr, write_png
-    from mitsuba_diffraction.tables.exr import write_channels
+    from mitsuba_diffraction.tables import write_channels
     from mitsuba_diffraction.tables.store import Record, write_record
     from tests.support.directions import rough_patch
     from tests.support.orders import thin_grating
@@ -46,7 +44,6 @@ def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
     for n in range(3):
         frames.append(scratch / f"{n}.png")
         Image.fromarray((noise[30] * 80 * n).astype(np.uint8)).save(frames[-1])
-    figure = plt.figure(figsize=(1, 1))
     grid = DEFAULT._replace(
         theta=np.array([0.0, 40.0]), phi=np.array([-180.0, 180.0]), resolution=8,
         wavelengths=np.array([500.0, 600.0]),
@@ -54,6 +51,7 @@ def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
     table.save(scratch / "table.exr")
     raw = {"material": "none", "energy_conserving": False}
     surface = mi.load_dict(md.bsdf_dict(scratch / "table.exr", **raw))
+    brdf_map = md.maps.brdf_map(surface, 30.0, resolution=8)
     triangle = TriangleMesh(np.eye(3), np.eye(3), np.eye(3)[:, :2], np.array([[0, 1, 2]]))
     found: dict[str, Callable[[Path], None]] = {
         "table.exr": table.save, "orders.nc": orders.save,
@@ -64,7 +62,7 @@ def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
         "channels.exr": lambda path: write_channels(path, {"Y": noise[8][..., 0]}),
         "many.exr": lambda path: write_channels(path, {"RGBA": noise[30][..., [0, 1, 2, 0]]}),
         "text.json": lambda path: save_json(path, {"a": [0.5] * 500}),
-        "figure.png": lambda path: save_figure(path, figure),
+        "map.png": lambda path: md.maps.save_png(brdf_map, path),
         "rgl.bsdf": lambda path: save_rgl(surface, path, grid),
         "mesh.ply": lambda path: write_ply(path, triangle),
         "record.cache": lambda path: write_record(path, "t", Record({}, [noise[30]])),

@@ -16,8 +16,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.plugin import installed
-from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
+from mitsuba_diffraction.scene.orientation import TriangleMesh, write_ply
 from tests.support import ROOT
 from tests.support.command_line import Ran
 
@@ -209,16 +208,13 @@ _RUNNER = """
 import json, os, signal, sys
 import scipy.interpolate, scipy.ndimage, scipy.spatial
 from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.realtime.glsl import bounces, surroundings
-from mitsuba_diffraction.realtime.web import export
-from tests.support.coarse import coarse_energy
+from pytest import MonkeyPatch
+from tests.support.coarse import coarse_energy, little_light
 from tests.support.kernels import compile_quickly
 
 coarse_energy()
 compile_quickly()
-bounces._POINTS = 1 << 8
-surroundings._CELLS = 1 << 16
-export.OCTAVES = (0.0,)
+little_light(MonkeyPatch().setattr)
 
 def run(group, names):
     if process := os.fork():

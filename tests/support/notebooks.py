@@ -59,13 +59,6 @@ def hindrance(notebook: Any) -> str | None:
             return reason
     if "SurfaceTopography" in source and not importlib.util.find_spec("SurfaceTopography"):
         return "SurfaceTopography (extra afm) is not installed"
-    if "md.glsl" in source:
-        from mitsuba_diffraction.realtime.glsl.context import headless_context
-
-        try:
-            headless_context().release()
-        except DiffractionError as error:
-            return str(error)
     return None
 
 
@@ -114,7 +107,12 @@ def check(path: Path, folder: Path) -> None:
     before = read(path)
     if reason := hindrance(before):
         pytest.skip(reason)
-    now = execute(smaller(path, folder))
+    try:
+        now = execute(smaller(path, folder))
+    except DiffractionError as error:
+        if "no OpenGL without a window" not in str(error):
+            raise
+        pytest.skip(str(error))
     # what a notebook teaches should not need excuses
     assert streams(now, "stderr") == ""
     # whoever only reads it sees what it shows

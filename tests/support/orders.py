@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from scipy.special import jv
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
-from mitsuba_diffraction.orders.listed import Lights, listed_table
 from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, turn
 from mitsuba_diffraction.reference.model import small_slope
 from tests.support.directions import Array, as_single, uniform_directions
@@ -71,18 +71,15 @@ def thin_grating(
 @functools.cache
 def listed_grating() -> OrderTable:
     """`thin_grating` in light from -20, 0 and 20° alone."""
-    wavelengths, theta, orders = (
-        np.arange(380.0, 781.0, 50),
-        np.array([-20.0, 0.0, 20.0]),
-        range(-6, 7),
-    )
-    lam, sine, m = np.meshgrid(wavelengths, np.sin(np.radians(theta)), orders, indexing="ij")
-    values = thin_grating().efficiency(-sine, 0.0, lam, m)
-    values[np.abs(m * lam / (1e3 * PERIOD) - sine) >= 1.0] = np.nan
-    pairs = np.column_stack([orders, 0 * np.array(orders)])
-    values = values[:, :, None, None, None, :, None]
-    lights = Lights(wavelengths, theta, np.zeros(1), pairs, values)
-    return listed_table(lights, (PERIOD, np.inf), {"profile": "thin sinusoid"})
+    lines = ["wavelength_nm,theta_deg,order,R_s,R_p"]
+    for lam, theta, m in itertools.product(range(380, 781, 50), (-20, 0, 20), range(-6, 7)):
+        sine = np.sin(np.radians(theta))
+        if abs(m * lam / (1e3 * PERIOD) - sine) < 1.0:
+            value = float(thin_grating().efficiency(-sine, 0.0, lam, m))
+            lines.append(f"{lam},{theta},{m},{value},{value}")
+    with tempfile.TemporaryDirectory() as folder:
+        (file := Path(folder, "thin_sinusoid.csv")).write_text("\n".join(lines), "utf-8")
+        return md.read_orders(file, PERIOD)
 
 
 @functools.cache

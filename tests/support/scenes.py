@@ -16,7 +16,7 @@ def rendered(name: str, **parameters: str) -> np.ndarray:
     """The picture of a scene, of 48 × 40 pixels unless told otherwise."""
     import mitsuba as mi
 
-    from mitsuba_diffraction.scene.load import load_scene
+    from mitsuba_diffraction.scene import load_scene
 
     scene = load_scene(SCENES / f"{name}.xml", SMALL | parameters)
     return np.array(mi.render(scene, seed=1))

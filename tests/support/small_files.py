@@ -65,57 +65,21 @@ def heights(path: Path) -> object:
 
 
 def mesh(path: Path) -> object:
-    from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
+    from mitsuba_diffraction.scene.orientation import load_mesh
 
     return load_mesh(path)
 
 
 def scene(path: Path) -> object:
-    from mitsuba_diffraction.scene.load import load_scene
+    from mitsuba_diffraction.scene import load_scene
 
     return load_scene(path, {})
 
 
-def layers(path: Path) -> object:
-    from mitsuba_diffraction.plugin.stack import read_layers
-
-    return read_layers(path)
-
-
 def solved_layers(path: Path) -> object:
-    from mitsuba_diffraction.orders.solve.films import read_layers
+    from mitsuba_diffraction.orders.solve import read_layers
 
     return read_layers(path)
-
-
-def efficiencies(path: Path) -> object:
-    from mitsuba_diffraction.orders.lists import read_efficiencies
-
-    return read_efficiencies(path)
-
-
-def orders(path: Path) -> object:
-    from mitsuba_diffraction.orders.file import load_orders
-
-    return load_orders(path)
-
-
-def pigment(path: Path) -> object:
-    from mitsuba_diffraction.plugin.pigment import pigment_bsdf
-
-    return pigment_bsdf(str(path))
-
-
-def logo(path: Path) -> object:
-    from mitsuba_diffraction.scene.logo import areas
-
-    return areas(path)
-
-
-def table(path: Path) -> object:
-    import mitsuba_diffraction as md
-
-    return md.DiffractionTable.load(path)
 
 
 def zeros(count: int) -> bytes:
@@ -174,14 +138,8 @@ small("zeros.png", heights, lambda: png(12_000, 12_000))
 small("long_line.csv", heights, lambda: "1," * 2_500_000)
 small("long_cell.csv", heights, lambda: "1" * 5_000_000)
 small("long_line.dat", heights, lambda: "1 " * 4_000_000)
-small(
-    "layers.toml", layers, lambda: "repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n"
-)
-small(
-    "solved_layers.toml",
-    solved_layers,
-    lambda: "repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n",
-)
+LAYERS = "repeat = 1000\nlayers = [" + '["1.3", 0.001],' * 60_000 + "]\n"
+small("solved_layers.toml", solved_layers, lambda: LAYERS)
 small("dots.toml", heights, lambda: "a." * 490_000 + "b = 1\n")
 small("sources.toml", heights, lambda: "source = [" + '"a",' * 240_000 + "]\n")
 
@@ -195,7 +153,7 @@ def _(path: Path) -> None:
 def run(names: list[str], folder: Path) -> None:
     """Write and read files; print what is said of each."""
     from mitsuba_diffraction.errors import DiffractionError
-    from mitsuba_diffraction.scene.load import set_variant
+    from mitsuba_diffraction.scene import set_variant
     from mitsuba_diffraction.system import peak_memory
 
     set_variant("scalar_rgb")

@@ -9,7 +9,9 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.support.small_files import FILES, hostile, mesh, pigment, png, run, scene, small
+import numpy as np
+
+from tests.support.small_files import FILES, LAYERS, hostile, mesh, png, run, scene, small
 
 __all__ = ["FILES"]
 
@@ -169,9 +171,6 @@ def _(path: Path) -> None:
     path.write_text(json.dumps(document))
 
 
-small(
-    "pigment.gltf", pigment, lambda: json.dumps(_with_picture(png(13_000, 13_000, 8, 4))), "trimesh"
-)
 _USD = """#usda 1.0
 def Mesh "m"
 {
@@ -183,6 +182,27 @@ def Mesh "m"
 
 
 small("count.usda", mesh, lambda: _USD % "2000000000", "pxr")
+
+
+# --- surfaces ------------------------------------------------------------------------------------
+def surfaced(parameter: str, file: str, content: Callable[[], str], needs: str = "") -> None:
+    """Register a scene with a flat surface, one parameter of which is a file of this content."""
+
+    @hostile(f"{parameter}.xml", scene, needs)
+    def write(path: Path) -> None:
+        (path.parent / file).write_text(content())
+        np.save(path.parent / "flat.npy", np.zeros((8, 8)))
+        path.write_text(scene_of(
+            '<shape type="sphere"><bsdf type="diffraction"><string name="filename" '
+            'value="flat.npy"/><float name="pixel_size" value="1"/>'
+            f'<string name="{parameter}" value="{path.parent / file}"/></bsdf></shape>'
+        ))  # fmt: skip
+
+
+surfaced("layers", "layers.toml", lambda: LAYERS)
+surfaced(
+    "pigment", "a.gltf", lambda: json.dumps(_with_picture(png(13_000, 13_000, 8, 4))), "trimesh"
+)
 # --- scenes --------------------------------------------------------------------------------------
 small("deep.xml", scene, lambda: scene_of('<bsdf type="twosided">' * 8000 + "</bsdf>" * 8000))
 small(

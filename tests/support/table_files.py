@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -11,7 +12,6 @@ import numpy as np
 import OpenEXR
 
 from mitsuba_diffraction.files import TABLE_ATTRIBUTE
-from mitsuba_diffraction.tables.exr import CHECKSUM, _checksum
 
 
 def document_in(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -33,13 +33,14 @@ class Contents:
         text = json.dumps(self.document)
         rows, columns = next(iter(self.channels.values())).shape
         # the order in which a reader goes through the channels
-        ordered = {name: self.channels[name] for name in sorted(self.channels, key=_place)}
+        ordered = [self.channels[name] for name in sorted(self.channels, key=_place)]
+        checksum = hashlib.sha256(text.encode() + b"".join(plane.tobytes() for plane in ordered))
         header = {
             "type": OpenEXR.scanlineimage,
             "compression": OpenEXR.ZIP_COMPRESSION,
             "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
             TABLE_ATTRIBUTE: text,
-            CHECKSUM: _checksum(text, ordered),
+            "mitsuba_diffraction_sha256": checksum.hexdigest(),
         }
         OpenEXR.File(header, self.channels).write(str(path))
 

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, HeightField
-from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.heights.spectra import dominant_periods
+from mitsuba_diffraction.heights import dominant_periods, gratings
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.period_fit import (
     Beam,

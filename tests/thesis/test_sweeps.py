@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.analysis.maps import LightDirection
-from mitsuba_diffraction.analysis.maps.picture import contact_sheet
+from mitsuba_diffraction.analysis.maps import LightDirection, contact_sheet
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain

@@ -9,3 +9,5 @@ rgl      RGL's tensors (.bsdf), which Mitsuba's BSDF `measured` renders
 zemax    tabular BSDF of OpticStudio (.bsdf), one wavelength
 scatter  JSON of the BiRD project (.json, .brdf), and long CSV
 """
+
+__all__ = ["rgl", "scatter", "zemax"]

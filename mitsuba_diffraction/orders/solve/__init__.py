@@ -25,6 +25,7 @@ recipes     recipes with `method = "solved"`
 from .chandezon import Chandezon
 from .coupled import CoupledWaves
 from .crossed import CrossedWaves
+from .films import read_layers
 from .grating_index import material_of
 from .integral import IntegralSolver
 from .recipes import SolvedRecipe
@@ -35,5 +36,5 @@ from .stations import CrossedStation, Grating, Solver, Station
 __all__ = [
     "Chandezon", "CoupledWaves", "CrossedStation", "CrossedWaves", "Grating", "IntegralSolver",
     "Settings", "SolvedRecipe", "Solver", "Station", "jobs", "material_of",
-    "profiles", "sheet_efficiencies",
+    "profiles", "read_layers", "sheet_efficiencies",
 ]  # fmt: skip

@@ -12,13 +12,19 @@ directions   `direction_field`: a smooth field of directions on any mesh
 
 from __future__ import annotations
 
-from .directions import DirectionField, direction_field
+from .directions import GUIDES, DirectionField, direction_field
 from .mesh_files import MeshFile, load_mesh, load_orientation, read_mesh, write_ply
 from .tangents import TangentReport, check_tangents
-from .trimesh import TriangleMesh, cell_corners, grid_faces, oriented_mesh
+from .trimesh import (
+    TriangleMesh,
+    cell_corners,
+    grid_faces,
+    oriented_mesh,
+    texture_tangents,
+)
 
 __all__ = [
-    "DirectionField", "MeshFile", "TangentReport", "TriangleMesh", "cell_corners",
+    "GUIDES", "DirectionField", "MeshFile", "TangentReport", "TriangleMesh", "cell_corners",
     "check_tangents", "direction_field", "grid_faces", "load_mesh", "load_orientation",
-    "oriented_mesh", "read_mesh", "write_ply",
+    "oriented_mesh", "read_mesh", "texture_tangents", "write_ply",
 ]  # fmt: skip

@@ -7,6 +7,6 @@ build       how it is summed, on a polar grid
 proposals   densities to draw directions from, by brightness
 """
 
-from .table import ColourTable
+from .table import ColourTable, cached_colours, colour_difference
 
-__all__ = ["ColourTable"]
+__all__ = ["ColourTable", "cached_colours", "colour_difference"]

@@ -9,3 +9,5 @@ gain           factor of |a_j|² in the power of an order, by path, model and ma
 scaling        the scale of a symmetric kernel with given sums
 settings       resolution and limits, all of them part of the cache's key
 """
+
+__all__ = ["conservation", "conserved", "settings"]

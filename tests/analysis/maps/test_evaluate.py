@@ -11,8 +11,8 @@ from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, evaluate, hemisphere
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.optics.geometry import sigma_of
+from tests.analysis.maps.mapped import GRATING, centres, mirror, plugin
 from tests.support.directions import rough_patch
-from tests.support.mapped import GRATING, centres, mirror, plugin
 
 # Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
 pytestmark = [

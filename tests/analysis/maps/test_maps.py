@@ -16,7 +16,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, HeightField, OrderTable
 from mitsuba_diffraction.analysis import maps
 from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, hemisphere
-from tests.support.mapped import GRATING, centres, mirror, plugin
+from tests.analysis.maps.mapped import GRATING, centres, mirror, plugin
 from tests.support.variants import runs
 
 # Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.

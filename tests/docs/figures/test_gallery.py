@@ -11,7 +11,7 @@ from PIL import Image
 from docs.make.figures import gallery
 from docs.make.figures.pages import write_jpeg
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of
 from scenes.make.__main__ import build_parser as meshes_parser
 from tests.support import ROOT

@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from docs.make.figures import pages, thesis
-from mitsuba_diffraction.cli.options import METHODS
+from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.sweeps import SWEEPS
 from tests.support import ROOT
 
@@ -22,9 +22,7 @@ def test_the_table_of_methods_is_made_by_one_command(tmp_path, capsys, some_vari
     assert code == 0, capsys.readouterr().err
     text = pages.part(page.read_text(encoding="utf-8"), "methods")
     rows = {line.split("|")[1].strip(): line.split("|") for line in text.splitlines()[2:9]}
-    assert set(rows) == {
-        *(f"`{n}`" for n in METHODS), "nmm, lobes",
-    }  # fmt: skip
+    assert set(rows) == {*(f"`{n}`" for n in methods.NAMES), "nmm, lobes"}
     assert float(rows["`flss`"][3]) == 1.0
 
 

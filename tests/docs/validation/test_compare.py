@@ -10,7 +10,7 @@ from docs.make.validation.cases import PROBE_GRATING, PROFILES, Case, Grating, L
 from docs.make.validation.compare import Comparison, compare
 from docs.make.validation.model import modelled
 from docs.make.validation.solutions import Solutions, shipped
-from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 from mitsuba_diffraction.reference import fresnel
 
 

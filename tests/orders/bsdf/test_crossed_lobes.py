@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.geometry import sigma_of
 from tests.support import crossed
 from tests.support.variants import evaluate, interaction
@@ -203,12 +202,3 @@ def test_the_orientation_has_a_derivative(name, table):
     mi.set_variant("llvm_ad_spectral")
     # single precision, and half floats of a table that is linear between its nodes
     assert slope == pytest.approx((high - low) / 0.1, rel=0.03)
-
-
-def test_shaders_refuse_it(variant, table):
-    from mitsuba_diffraction.osl.export import OSL
-    from mitsuba_diffraction.realtime.glsl.export import SHADER
-
-    for consumer in (OSL, SHADER):
-        with pytest.raises(DiffractionError, match=r"crossed grating.*render it with Mitsuba"):
-            consumer.described(load(table))

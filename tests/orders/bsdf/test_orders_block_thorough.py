@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.support.blocks import BLOCK, WIDTH, indices, near_orders, reference
+from tests.orders.blocks import BLOCK, WIDTH, indices, near_orders, reference
 from tests.support.chi_square import DISPERSED, Case, chi_square
 from tests.support.orders import load
 from tests.support.transmitting import OneSide

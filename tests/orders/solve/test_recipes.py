@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.heights.recipes import Recipe
+from mitsuba_diffraction.heights import Recipe
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 

@@ -11,7 +11,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.listing import list_orders
-from tests.support.blocks import BLOCK, INDEX
+from tests.orders.blocks import BLOCK, INDEX
 from tests.support.orders import thin_grating
 
 

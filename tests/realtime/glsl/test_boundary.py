@@ -21,9 +21,9 @@ from mitsuba_diffraction.realtime.glsl.packing import (
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.reference import boundary, fresnel, model
-from mitsuba_diffraction.tables.colour.table import cached_colours
+from mitsuba_diffraction.tables.colour import cached_colours
+from tests.realtime.glsl.shaders import DAYLIGHT, PERFECT, difference, probed
 from tests.support.directions import as_single, uniform_directions
-from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
 METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
 DIELECTRIC = Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"})

@@ -11,11 +11,11 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.reference.fresnel import amplitudes
+from tests.realtime.glsl.shaders import shaded
 from tests.support.blender import blender
 from tests.support.cycles import plane_seen
 from tests.support.directions import Array, polar
 from tests.support.furnace import furnace_in
-from tests.support.shaders import shaded
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("some_variant")]
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
-import weakref
-from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -16,10 +13,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
+import mitsuba_diffraction.thesis.shaders  # noqa: F401 - registers its methods
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, bsdf_dict
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.plugin.description import describe
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.methods import METHODS
@@ -46,14 +45,13 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     shortened,
 )
 from mitsuba_diffraction.reference.fresnel import reflectance
-from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
+from mitsuba_diffraction.tables.colour import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
-from mitsuba_diffraction.thesis.shaders.pack import pack_method, thesis_method
+from tests.realtime.glsl.shaders import DAYLIGHT, PERFECT, difference, probed, shaded
 from tests.support.directions import polar
 from tests.support.lanes import interaction, vectors
 from tests.support.patches import SMALL_SCAN
-from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed, shaded
 
 pytestmark = pytest.mark.thorough
 
@@ -204,7 +202,10 @@ def test_the_documents_methods_are_those_of_their_evaluators(
     )
     total = wi + wo
     at = np.concatenate([total, np.ones((600, 1))], axis=1)
-    packed = pack_method(method)
+    mi.set_variant("llvm_ad_rgb")
+    raw = {"material": "none", "energy_conserving": False}
+    bsdf = mi.load_dict(bsdf_dict(blazed, coherence_width=8.0, coherence=coherence, **raw))
+    packed = METHODS[name].tables(describe(bsdf))
     found = probed(gl, name, packed | pack_responses(DAYLIGHT) | PERFECT, at)
     outside = (0.5 * np.sum(total**2, axis=1) / total[:, 2]) ** 2 / (wi[:, 2] * wo[:, 2])
     found *= (outside * packed.uniforms["area_factor"])[:, None]
@@ -316,27 +317,6 @@ def test_lists_keep_their_order_over_rows() -> None:
     data = listed("numbers", entries).data
     assert data.shape == (3, PAGE, 4)
     np.testing.assert_array_equal(data.reshape(-1, 4)[: len(entries)], entries)
-
-
-def test_the_documents_tables_are_built_once(
-    table: DiffractionTable, patch: HeightField, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
-    first = thesis_method("flss", patch, table)
-    expected, in_memory = first.table.coefficients.copy(), weakref.ref(first.table)
-    assert len([*tmp_path.glob("*.cache")]) == 1
-
-    def build(*_: object, **__: object) -> DiffractionTable:
-        raise AssertionError("built again")
-
-    monkeypatch.setattr("mitsuba_diffraction.tables.source.build_with", build)
-    del first
-    gc.collect()
-    assert in_memory() is None  # as in the next process
-    second = thesis_method("flss", patch, table)
-    np.testing.assert_array_equal(second.table.coefficients, expected)
-    with pytest.raises(AssertionError, match="built again"):
-        thesis_method("pq", patch, table)
 
 
 def test_half_floats_are_taken_where_they_hold(table: DiffractionTable) -> None:

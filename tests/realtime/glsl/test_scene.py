@@ -8,7 +8,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.realtime.glsl.scene import triangles_of
+from mitsuba_diffraction import DiffractionError, bsdf_dict, gratings
+from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of
 from mitsuba_diffraction.realtime.glsl.shadows import Solid, outline
 from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
 
@@ -99,3 +100,18 @@ def test_no_ray_slips_through_a_large_triangle(some_variant: str) -> None:
     x, y, z = ((inside - low) / cell).astype(int).T
     assert (texels[z, y, x] == 0).mean() > 0.9
     assert texels[z, y, x].max() <= 4 * 3**0.5
+
+
+def test_attributes_that_are_missing_and_places_are_refused(some_variant: str) -> None:
+    props = mi.Properties()
+    turn = {"type": "mesh_attribute", "name": "vertex_orientation"}
+    props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": turn})
+    placed = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}
+    disk = {"type": "disk", "bsdf": bsdf_dict(gratings.sinusoidal(1.6, 0.05, periods=2), **placed)}
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
+    for shape, words in (
+        (mi.Mesh("plate", 3, 1, props=props), "no attribute vertex_orientation"),
+        (disk, "coherence='surface'"),
+    ):
+        with pytest.raises(DiffractionError, match=words):
+            read_scene(mi.load_dict({"type": "scene", "shape": shape, "sensor": sensor}))

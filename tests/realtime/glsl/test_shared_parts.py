@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import mitsuba as mi
@@ -10,15 +11,25 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable, reference
+from mitsuba_diffraction.plugin.description import Surface
+from mitsuba_diffraction.realtime.glsl.maps import axis_map
 from mitsuba_diffraction.realtime.glsl.modelled import Modelled
 from mitsuba_diffraction.realtime.glsl.packing import pack_colours
+from mitsuba_diffraction.realtime.glsl.shader_materials import (
+    GLSL,
+    ShaderMaterial,
+    pack_conservation,
+    pack_surface,
+    packed_by,
+)
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
-from mitsuba_diffraction.tables.colour.table import cached_colours
+from mitsuba_diffraction.tables.colour import cached_colours
+from tests.realtime.glsl.shaders import PERFECT, difference, probed
+from tests.support.descriptions import CHANGES, ELSEWHERE, base
 from tests.support.kinds import COATED, SLOPE
 from tests.support.lanes import interaction, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
 from tests.support.patches import SPECKLE
-from tests.support.shaders import PERFECT, difference, probed
 
 STRETCH, WAVELENGTH = 0.7, 550.0
 
@@ -90,3 +101,17 @@ def test_the_page_turns_a_patch_to_the_left(gl: Any) -> None:
     (found,) = probed(gl, "fast", parts, np.zeros((1, 4)))
     angle = np.arctan2(0.8, 0.6) + turn
     assert_allclose(found[:2], 0.7 * np.array([np.cos(angle), np.sin(angle)]), rtol=1e-5)
+
+
+def packed_of(described: Surface) -> object:
+    drawn = ShaderMaterial(axis_map(described), packed_by(described), axis=axis_map(described))
+    packed = pack_surface(drawn) | pack_conservation(drawn)
+    textures = {texture.name: texture.data.tobytes() for texture in packed.textures}
+    scale, axis = described.height_scale.number, axis_map(described).value.tolist()
+    return packed.uniforms, packed.definitions, textures, scale, axis
+
+
+def test_every_feature_that_is_shown_changes_what_is_packed(some_variant: str) -> None:
+    plain = packed_of(base())
+    for feature in GLSL.shows - ELSEWHERE:
+        assert packed_of(replace(base(), **CHANGES[feature])) != plain, feature

@@ -22,8 +22,8 @@ from mitsuba_diffraction.realtime.glsl.packing import pack_responses
 from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.solved import order_power, pack_orders
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
+from tests.realtime.glsl.shaders import DAYLIGHT, difference, probed
 from tests.support.orders import load, thin_grating
-from tests.support.shaders import DAYLIGHT, difference, probed
 
 WIDTH = 65.0  # µm
 _LAM = np.arange(381.0, 780.0, 2.0)  # nm; lobes are at least 4 nm wide

@@ -10,7 +10,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.heights.recipes import Recipe
+from mitsuba_diffraction.heights import Recipe
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.scene.planning.light import (
     BINS,
@@ -28,7 +28,7 @@ from mitsuba_diffraction.scene.planning.plan import (
     recipe_of,
 )
 from mitsuba_diffraction.scene.planning.report import wavelengths_needed
-from mitsuba_diffraction.tables.source import TableRequest
+from mitsuba_diffraction.tables import TableRequest
 from tests.support.directions import polar, rough_patch
 
 # Of coarse pixels: small tables. The plugin warns of that, and this is not about that.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
-from mitsuba_diffraction.heights import field as field_module
 from mitsuba_diffraction.heights.coherence import LOOKUP, resolved, window_corners
-from mitsuba_diffraction.heights.validity import tilted
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build import powers as powers_module
@@ -225,18 +225,23 @@ def test_a_tile_that_is_too_wide_is_told_of_windows(scan):
     assert "windows" not in str(refused.value)  # which coherence='patch' refuses
 
 
-def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
-    heights = rough(300).astype(np.float32)
-    np.save(tmp_path / "scan.npy", heights)
-    whole = HeightField.load(tmp_path / "scan.npy", pixel_size=PIXEL)
-    monkeypatch.setattr(field_module, "LARGE", 1)
-    parts = HeightField.load(tmp_path / "scan.npy", pixel_size=PIXEL)
-    np.testing.assert_array_equal(parts.heights, heights)
-    assert parts.rms_slope == pytest.approx(whole.rms_slope, rel=1e-12)
-    assert parts.rms_height == pytest.approx(whole.rms_height, rel=1e-12)
-    level = parts.treated(level="plane")
-    assert "RMS change" in level.history[-1]
-    tilt = tilted(parts, 0.4)
-    monkeypatch.undo()
-    assert level.history == whole.treated(level="plane").history
-    assert tilt is tilted(whole, 0.4)
+def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, monkeypatch):
+    monkeypatch.setattr(module, "BATCH_POINTS", 1)
+    whole = Screens([scan], 12.0, 14.0)
+    batches = whole.batches()
+    assert len(batches) == len(whole) == 13
+    sent = [pickle.loads(pickle.dumps(batch)) for batch in batches]
+    for n, batch in enumerate(sent):
+        assert batch.scans[0].shape == whole.shape
+        np.testing.assert_array_equal(batch[0].heights, whole[n].heights)
+
+
+def test_batches_are_of_neighbours_and_hold_every_window_once(scan, monkeypatch):
+    ny, nx = Screens([scan], 6.0, 7.0).shape
+    monkeypatch.setattr(module, "BATCH_POINTS", 3 * ny * nx)
+    whole = Screens([scan, scan], 6.0, 7.0)
+    batches = whole.batches()
+    assert {len(batch) for batch in batches} <= {1, 2, 3}
+    found = [batch[n].heights for batch in batches for n in range(len(batch))]
+    np.testing.assert_array_equal(found, [one.heights for one in whole])
+    assert max(b.__getstate__()["scans"][0].heights.size for b in batches) <= 3.01 * ny * nx

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from mitsuba_diffraction import cluster
-from mitsuba_diffraction.cluster.frames import FrameRequest, FrameSequence
-from mitsuba_diffraction.scene.load import set_variant
+from mitsuba_diffraction.cluster import FrameRequest, FrameSequence
+from mitsuba_diffraction.scene import set_variant
 
 VARIANT = "llvm_ad_rgb"
 SPP = 24
