@@ -124,7 +124,8 @@ def hidden_by(name: str) -> Path | None:
             room /= part
         elif exported:
             # a function is no module of the same name
-            if re.search(rf"^from \.{exported} import .*\b{exported}\b", initial(room), re.M):
+            names = rf"(\([^)]*|.*)\b{exported}\b"
+            if re.search(rf"^from \.{exported} import {names}", initial(room), re.M):
                 return room
         elif part in exports(room) or part.startswith("__"):
             exported = part
@@ -172,6 +173,21 @@ def test_programs_use_what_rooms_export():
     assert not wrong, "\n".join(wrong)
 
 
+def test_rooms_use_what_other_rooms_export():
+    wrong = []
+    for file in sorted(INSTALLED.rglob("*.py")):
+        place = file.relative_to(INSTALLED.parent).with_suffix("").parts[:-1]
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or not node.level:
+                continue
+            start = ".".join([*place[: len(place) + 1 - node.level], node.module or ""]).rstrip(".")
+            names = [f"{start}.{alias.name}" for alias in node.names]
+            room = INSTALLED / f"{start}.".split(".")[1]
+            if room.is_dir() and not file.is_relative_to(room):
+                wrong += [f"{file}:{node.lineno}: {name}" for name in names if hidden_by(name)]
+    assert not wrong, "not in __all__ of their rooms:\n" + "\n".join(wrong)
+
+
 #: What tests use of inner modules of other rooms.
 INNER = {
     # formulas as text: a shader holds them between others, of one surface
@@ -209,15 +225,15 @@ from mitsuba_diffraction import DiffractionTable, errors, reference as judge
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e, _cie
 from mitsuba_diffraction.tables.exr import load_table
-import mitsuba_diffraction.optics.lobes as lobes
+import mitsuba_diffraction.tables.document as document
 judge.brdf, judge.screens, DiffractionTable.build, judge.fresnel.amplitudes
-setattr("mitsuba_diffraction.heights.read.LEVELS", ())
+setattr("mitsuba_diffraction.heights.validity.LEVELS", ())
 program = "from mitsuba_diffraction.osl.export import OSL, export"
 """
     hidden = {name for _, name in names_of_the_package(source) if hidden_by(name)}
     assert {name.partition(".")[2] for name in hidden} == {
-        "optics.colour._cie", "tables.exr.load_table", "optics.lobes", "reference.screens",
-        "heights.read.LEVELS", "osl.export.OSL", "osl.export.export",
+        "optics.colour._cie", "tables.exr.load_table", "tables.document", "reference.screens",
+        "heights.validity.LEVELS", "osl.export.OSL", "osl.export.export",
     }  # fmt: skip
 
 

@@ -28,4 +28,8 @@ design         surfaces from their BRDF or colours, by gradients with respect to
 energy         albedo of a table's surface before and after energy conservation
 """
 
-__all__ = ["angular_variables", "energy", "machine", "observers", "pictures", "timing"]
+__all__ = [
+    "angular_variables", "crops", "design", "energy", "false_colour", "iridescence",
+    "known_wavelengths", "machine", "media", "observers", "pictures", "repeats", "scans",
+    "spectra", "spectra_files", "spectrometer", "survey", "timing", "treatments",
+]  # fmt: skip

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import DiffractionError
-from ..heights.field import HeightField
-from ..heights.read import LoadOptions, treated_by_default
-from ..heights.source import Source
+from ..heights import HeightField, LoadOptions, Source
+from ..heights.read import treated_by_default
 
 #: Fewest pixels of a crop along a side.
 FEWEST_PIXELS = 32

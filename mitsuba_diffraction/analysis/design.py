@@ -26,7 +26,8 @@ from scipy import fft, ndimage, optimize
 from .. import reference
 from ..arrays import Real
 from ..errors import DiffractionError
-from ..heights.field import HeightField, check_pixel_count
+from ..heights import HeightField
+from ..heights.field import check_pixel_count
 from ..heights.lengths import PixelSize
 from ..optics import colour
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..orders.solve.grating_index import material_of
+from ..tables import DiffractionTable
 from ..tables.energy.conservation import Energy, SurfaceEnergy
 from ..tables.energy.conserved import Reflector, Transmitter
-from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees), wavelengths (nm), and number of azimuths of the albedos.
 ANGLES, WAVELENGTHS, AZIMUTHS = (0.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0), (450.0, 550.0, 650.0), 24

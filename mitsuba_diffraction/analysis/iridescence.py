@@ -26,8 +26,8 @@ from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import sigma_of, wavenumber
+from ..tables import DiffractionTable
 from ..tables.powers import order_0_power, power_series
-from ..tables.table import DiffractionTable
 from .maps.result import LightDirection
 
 #: Coherence width of the index, µm; its lobes are 3.3° wide (half maximum, 550 nm, at the normal),

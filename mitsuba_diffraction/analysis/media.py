@@ -16,7 +16,7 @@ import mitsuba as mi
 
 from ..errors import DiffractionError, quoted
 from ..optics.materials import SODIUM, TISSUES, index_at_sodium, material_named
-from ..tables.source import TableSource
+from ..tables import TableSource
 
 #: Largest index of a medium above a surface.
 MOST_MEDIUM = 2.0

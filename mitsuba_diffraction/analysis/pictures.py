@@ -11,11 +11,11 @@ from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
 from ..arrays import Real
-from ..heights.field import HeightField
-from ..heights.spectra import far_field, height_spectrum, order_powers, profile
+from ..heights import HeightField, order_powers
+from ..heights.spectra import far_field, height_spectrum, profile
+from ..tables import DiffractionTable
 from ..tables.energy.conservation import Conservation, SurfaceEnergy
 from ..tables.energy.conserved import Reflector
-from ..tables.table import DiffractionTable
 
 RED, GREEN, BLUE = 650.0, 550.0, 450.0  # nm
 

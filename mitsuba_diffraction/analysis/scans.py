@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionWarning
-from ..heights.field import HeightField
+from ..heights import HeightField
 from ..progress import Progress, silent
 from ..settings import TableSettings
+from ..tables import DiffractionTable, TableSource, providing
 from ..tables.build.build import build_with
-from ..tables.source import TableSource, providing
-from ..tables.table import DiffractionTable
 
 # Of a flat patch whose table takes no time: µm, and parameters.
 _PIXEL, _QUICK = 0.05, {"coherence_width": 1.0, "energy_conserving": False}

@@ -25,13 +25,12 @@ from ..cluster.jobs import run_jobs
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import readable_file
+from ..heights import Source
 from ..heights.coherence import REPEATS, widest_window
-from ..heights.source import Source
 from ..heights.spectra import examine_periods
 from ..progress import Progress, silent
-from ..tables.source import TableSource
+from ..tables import DiffractionTable, TableSource
 from ..tables.store import key_of
-from ..tables.table import DiffractionTable
 from .crops import crops_of
 from .iridescence import WINDOW, MaterialFactor, light_and_chance
 from .maps import brdf_map
@@ -110,7 +109,7 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     import drjit as dr
 
     from ..plugin.dictionary import bsdf_dict
-    from ..scene.load import set_variant
+    from ..scene import set_variant
 
     set_variant(job.variant)
     if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
@@ -185,7 +184,7 @@ def _material(job: Job, table: DiffractionTable) -> MaterialFactor:
     Mitsuba takes seconds to change the variant: it loads its integrators again.
     """
     from ..plugin.dictionary import bsdf_dict
-    from ..scene.load import set_variant
+    from ..scene import set_variant
 
     key = job.surface, job.theta, job.variant
     if key not in _materials:

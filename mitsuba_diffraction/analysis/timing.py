@@ -14,9 +14,9 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionWarning
-from ..heights.field import HeightField
+from ..heights import HeightField
 from ..plugin.dictionary import bsdf_dict
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable
 
 #: Pixel size in µm of the patches that are timed: 1332 pixels span the default coherence window.
 PIXEL = 65.0 / 1332

@@ -22,7 +22,7 @@ from typing import Any
 
 from ..errors import DiffractionError, check_keys
 from ..files import read_toml
-from ..heights.read import LoadOptions
+from ..heights import LoadOptions
 from ..heights.recipes import LOAD_KEYS, options_and_settings
 from ..retired import retired
 from ..settings import RECIPE_SETTINGS

@@ -13,7 +13,7 @@ from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
-from ..scene.load import set_variant
+from ..scene import set_variant
 from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
@@ -233,8 +233,7 @@ def _by_method(
     args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
 ) -> tuple[Any, str, str]:
     """Map a method of the thesis; also return its surface and the method in words."""
-    from ..thesis.methods import make
-    from ..thesis.methods.make import method_map
+    from ..thesis.methods import make, method_map
 
     samples, single = args.samples or 1, args.wavelength
     gain = gain_of(args)

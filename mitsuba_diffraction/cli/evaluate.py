@@ -20,9 +20,9 @@ from .options import whole_number
 from .report import Figures, beside, elapsed, output_of, save_figure
 
 if TYPE_CHECKING:
-    from ..heights.field import HeightField
+    from ..heights import HeightField
     from ..heights.spectra import Periodicity
-    from ..tables.source import TableSource
+    from ..tables import TableSource
     from ..thesis.period_fit import Beam, Fit, Response, Ridge
 
 # Single windows are fitted at about so many wavelengths: the period needs no more.
@@ -112,8 +112,8 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
             f"method={args.method} reflects all light; leave the material out, or the method"
         )
     from ..analysis.media import in_medium, medium_index
-    from ..heights.spectra import dominant_periods
-    from ..tables.source import TableSource
+    from ..heights import dominant_periods
+    from ..tables import TableSource
     from ..thesis.methods.method import trapezoid_rule
     from ..thesis.methods.periods import check_period
     from ..thesis.period_fit import Beam
@@ -195,7 +195,7 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     from ..analysis.scans import bsdf_of, check_surface, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..plugin.dictionary import bsdf_dict
-    from ..scene.load import set_variant
+    from ..scene import set_variant
 
     steps = experiment.steps
     check_material(args.material, steps, args.pigment)

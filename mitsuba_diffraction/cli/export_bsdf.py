@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> Figures:
     if suffix not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
 
-    from ..scene.load import set_variant
+    from ..scene import set_variant
 
     set_variant(args.mode)
     from ..analysis.export import rgl, scatter, zemax

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> Figures:
         return [folder / f"{name}{suffix}" for suffix in (".osl", ".json")]
 
     from ..osl import check_name, export
-    from ..scene.load import set_variant
+    from ..scene import set_variant
 
     check_name(name)  # before the folder and the tables are made
     folder = output_of(args, Path(f"{look}-osl"), files_in, make_folder=True)
@@ -95,7 +95,7 @@ def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
 
     from ..osl import export
     from ..plugin.presets import presets
-    from ..scene.load import set_variant
+    from ..scene import set_variant
 
     set_variant(args.mode)
     folders = {}

@@ -33,8 +33,7 @@ from .report import Figures, output_of
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the folder, print the colours, and return the figures."""
-    from ..scene import label
-    from ..scene.load import set_variant
+    from ..scene import label, set_variant
     from ..scene.logo import areas
 
     default = Path(f"{args.picture.stem}_hologram")

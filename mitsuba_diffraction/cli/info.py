@@ -16,9 +16,7 @@ from .options import path_ending_in
 from .report import STDOUT, Figures, lines_of, plain, save_figure
 
 if TYPE_CHECKING:
-    from ..heights.field import HeightField
-    from ..heights.recipes import Recipe
-    from ..heights.source import Source
+    from ..heights import HeightField, Recipe, Source
 
 # What `render MESH` and `tangents` do with a mesh without normals
 _SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV edges stay"
@@ -53,7 +51,7 @@ def run(args: argparse.Namespace) -> Figures:
         return _formats(args)
     if args.file is None:
         args.parser.error("name a file, or give --formats")
-    from ..heights.source import Source
+    from ..heights import Source
 
     source = Source.of(args.file, options.load_options(args))
     others = FileKind.TABLE, FileKind.ORDERS, FileKind.MESH, FileKind.SCENE
@@ -144,8 +142,8 @@ def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
 
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
+    from ..heights import jumping_lines
     from ..heights.coherence import resolved, width_reason
-    from ..heights.validity import jumping_lines
 
     field = source.field()
     settings = TableSettings(**options.table_options(args))

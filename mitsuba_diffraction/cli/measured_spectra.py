@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..analysis.spectrometer import MeasurementGeometry
     from ..analysis.treatments import Treatment
     from ..orders import OrderTable
-    from ..tables.source import TableSource
+    from ..tables import TableSource
 
 
 @dataclass
@@ -44,7 +44,8 @@ class Measurement:
     def of_file(self, file: Path) -> list[Spectra]:
         """Measure the spectra of one file, or of its crops."""
         from ..orders.file import load_orders
-        from ..tables.source import TableSource, loaded_table
+        from ..tables import TableSource
+        from ..tables.source import loaded_table
 
         how = self._treatment(file).options
         source = TableSource.of(file, how)
@@ -100,9 +101,9 @@ class Measurement:
         from ..analysis.media import in_medium, medium_index, optical_scale
         from ..analysis.scans import table_of
         from ..analysis.spectra import table_range
+        from ..heights import dominant_periods
         from ..heights.coherence import blur
         from ..heights.source import notes_line
-        from ..heights.spectra import dominant_periods
 
         args, geometry, first = self.args, self.geometry, float(self.lam[0])
         asked = {**self._treatment(file).settings, **options.table_options(args, options.TABLE)}
@@ -148,7 +149,7 @@ class Measurement:
 
     def _say_first(self, line: str) -> None:
         """Print the notes on the first scan that has any, and warnings; count the others."""
-        from ..heights.validity import stands_in_full
+        from ..heights import stands_in_full
 
         self._noted += 1
         if self._noted == 1 or stands_in_full(line):

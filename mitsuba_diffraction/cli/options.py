@@ -15,13 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, quoted
-from ..heights.read import OPTIONS, LoadOptions
+from ..heights import LoadOptions
+from ..heights.read import OPTIONS
 from ..optics.display import VIEWS
 from ..settings import SETTINGS, TableSettings, checked
 from .report import Figures
 
 if TYPE_CHECKING:
-    from ..heights.field import HeightField
+    from ..heights import HeightField
 
 #: The values that `add_option` takes after the group.
 Row = tuple[Any, ...]
@@ -362,7 +363,7 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
     Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
-    from ..heights.source import Source
+    from ..heights import Source
 
     source = Source.of(args.source, load_options(args))
     settings = {**source.settings, **table_options(args)}
@@ -371,8 +372,8 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, and its refusal if size alone decides."""
+    from ..heights import units_warning
     from ..heights.coherence import resolved
-    from ..heights.validity import units_warning
     from ..tables.build.checks import check_units, check_window, period_of, warnings_of
 
     how = resolved(settings, fields)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..progress import Progress
-from ..scene.load import load_scene, sensor_of, set_variant
+from ..scene import load_scene, set_variant
+from ..scene.load import sensor_of
 from . import options, scene_options
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number

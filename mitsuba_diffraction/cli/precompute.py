@@ -17,11 +17,10 @@ from .report import Figures, check_outputs, output_name
 from .workers import WORKERS, client_of, on_workers
 
 if TYPE_CHECKING:
-    from ..heights.field import HeightField
+    from ..heights import HeightField
     from ..progress import Progress
     from ..settings import TableSettings
-    from ..tables import DiffractionTable
-    from ..tables.source import TableSource
+    from ..tables import DiffractionTable, TableSource
 
 
 @options.command(
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Build the table of each recipe, and return the figures."""
-    from ..tables.source import TableSource
+    from ..tables import TableSource
 
     how = options.load_options(args)
     recipes = [source for source in args.sources if kind_of(source) is FileKind.RECIPE]

@@ -14,7 +14,8 @@ from urllib.parse import urlencode
 
 from ..errors import DiffractionError
 from ..realtime.glsl.methods import METHODS, WEB_METHODS
-from ..scene.load import load_scene, sensor_of, set_variant
+from ..scene import load_scene, set_variant
+from ..scene.load import sensor_of
 from ..thesis import shaders  # noqa: F401 - registers its methods
 from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source

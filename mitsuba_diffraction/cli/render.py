@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import DiffractionError
 from ..extras import optional
+from ..scene import load_scene, set_variant
 from ..scene.denoise import denoised
 from ..scene.elements import surfaces_text
 from ..scene.frames import (
@@ -24,7 +25,7 @@ from ..scene.frames import (
     write_film,
     write_frame,
 )
-from ..scene.load import load_scene, preview_samples, sensor_of, set_variant
+from ..scene.load import preview_samples, sensor_of
 from ..scene.parameters import values_of_frames
 from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
@@ -148,7 +149,7 @@ def _on_workers(args: argparse.Namespace) -> Figures:
     parameters = scene_options.scene_parameters(args)
     outputs = _outputs(args)
 
-    from ..cluster.frames import FrameRequest
+    from ..cluster import FrameRequest
 
     variant = set_variant(args.mode)
     keep = outputs.named.with_name(f"{outputs.named.name}.passes")
@@ -301,7 +302,7 @@ def _frames_on_workers(
     args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; return how many were finished, and what the workers did."""
-    from ..cluster.frames import FrameRequest
+    from ..cluster import FrameRequest
 
     variant, done = set_variant(args.mode), 0
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]

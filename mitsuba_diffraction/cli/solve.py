@@ -17,7 +17,7 @@ from .report import Figures, check_outputs, output_name
 from .workers import WORKERS, executor_for
 
 if TYPE_CHECKING:
-    from ..heights.field import HeightField
+    from ..heights import HeightField
     from ..orders import OrderTable
     from ..orders.solve.films import Layers
     from ..orders.solve.recipes import SolvedRecipe
@@ -193,7 +193,8 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
 
 def _unit_cell(source: Path, args: argparse.Namespace) -> HeightField:
     """Read one period of heights in x and y."""
-    from ..heights.read import LoadOptions, read_heights
+    from ..heights import LoadOptions
+    from ..heights.read import read_heights
 
     if args.period is None:
         args.parser.error("argument --crossed: needs --period, µm")

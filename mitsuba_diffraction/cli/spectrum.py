@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..scene.load import set_variant
+from ..scene import set_variant
 from . import options
 from .brdf_map import surface_options, surface_parameters
 from .console import Bar, mitsuba_warnings, say

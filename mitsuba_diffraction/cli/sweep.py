@@ -10,7 +10,7 @@ from typing import Any
 
 from ..columns import save_rows
 from ..errors import DiffractionError, DiffractionWarning
-from ..scene.load import set_variant
+from ..scene import set_variant
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..scene.load import set_variant
+from ..scene import set_variant
 from ..scene.pictures import read_exr, write_png
 from . import options
 from .report import Figures, default_output, output_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionWarning
-from ..scene.load import set_variant
+from ..scene import set_variant
 from . import options
 from .console import Bar
 from .options import number_between
@@ -57,9 +57,8 @@ def run(args: argparse.Namespace) -> Figures:
     )
     from ..analysis.tradeoff.accuracy import Sample
     from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
-    from ..heights import gratings
+    from ..heights import Source, gratings
     from ..heights.coherence import resolved_width
-    from ..heights.source import Source
 
     side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
     if args.heights is None:
@@ -80,7 +79,7 @@ def run(args: argparse.Namespace) -> Figures:
             progress=bar,
         )
         best = recommended(results, Budget(*_budget(args).values()))
-        from ..tables.table import DiffractionTable
+        from ..tables import DiffractionTable
 
         finest = DiffractionTable.build(field, coherence_width=width, tolerance=1e-4)
         sample = Sample.draw(field, width, "ensemble", min(pairs, 160), bar)

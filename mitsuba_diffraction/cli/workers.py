@@ -17,7 +17,7 @@ from .options import Group, refuse, whole_number
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from ..cluster.frames import FrameRequest, FrameSequence
+    from ..cluster import FrameRequest, FrameSequence
 
 #: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
@@ -56,7 +56,7 @@ def worker_threads(args: argparse.Namespace) -> int:
 @contextlib.contextmanager
 def client_of(args: argparse.Namespace) -> Iterator[Any]:
     """Connect to the requested workers, and print the address of their pages."""
-    from ..cluster.workers import connect
+    from ..cluster import connect
 
     has_page = importlib.util.find_spec("bokeh") is not None
     with connect(args.workers, args.scheduler) as client:
@@ -69,7 +69,7 @@ def film_of(
     args: argparse.Namespace, client: Any, frames: Sequence[FrameRequest], variant: str, keep: Path
 ) -> FrameSequence:
     """Return the renderer of the command's frames on workers."""
-    from ..cluster.frames import FrameSequence
+    from ..cluster import FrameSequence
 
     film = FrameSequence(
         client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,

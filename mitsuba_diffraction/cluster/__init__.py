@@ -17,4 +17,6 @@ from .frames import FrameRequest, FrameSequence, render
 from .jobs import build
 from .workers import connect
 
-__all__ = ["FrameRequest", "FrameSequence", "build", "connect", "render", "tasks"]
+__all__ = [
+    "FrameRequest", "FrameSequence", "build", "connect", "jobs", "render", "tasks", "workers",
+]  # fmt: skip

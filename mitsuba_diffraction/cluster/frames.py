@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import DiffractionError, warn
 from ..progress import Progress, silent
-from ..scene.load import load_scene, preview_samples, sensor_of, set_variant
+from ..scene import load_scene, set_variant
+from ..scene.load import preview_samples, sensor_of
 from ..scene.passes import Result, Span, Stop, added, developed, integrator_of, passes_of
 from .groups import Groups, Report, Stopped, sums_in_worker
 from .kept import Kept

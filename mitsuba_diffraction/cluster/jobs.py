@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..heights import HeightField
 from ..heights.coherence import resolved
-from ..heights.field import HeightField
 from ..progress import Progress
 from ..settings import TableSettings
+from ..tables import DiffractionTable
 from ..tables.build.build import build_with
-from ..tables.table import DiffractionTable
 from .tasks import Failed, MissingFiles, check_versions, failures, versions
 from .workers import check_workers, outcome, wait_for_scheduler, workers_of
 

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
-from ..scene.load import load_scene, sensor_of, set_variant
+from ..scene import load_scene, set_variant
+from ..scene.load import sensor_of
 from ..scene.parameters import files_of
 from ..scene.passes import Pass, Span, added, integrator_of, render_pass
 from ..system import cores, peak_memory, processor

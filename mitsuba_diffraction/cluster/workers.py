@@ -213,7 +213,7 @@ def memory_warnings(client: Any, needed: float) -> Iterator[str]:
 
 def trouble_of_process(wanted: tuple[str, ...], variant: str | None) -> str | None:
     """Return the reason why this process cannot serve, or None."""
-    from ..scene.load import set_variant
+    from ..scene import set_variant
 
     try:
         check_versions(wanted)

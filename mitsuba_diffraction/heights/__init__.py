@@ -23,11 +23,20 @@ from .read import LoadOptions
 from .recipes import Recipe
 from .source import Source, load, treated
 from .spectra import dominant_periods, order_powers
-from .validity import GENTLE_SLOPE, STEEP_SLOPE, validity
+from .validity import (
+    GENTLE_SLOPE,
+    STEEP_SLOPE,
+    jumping_lines,
+    stands_in_full,
+    units_warning,
+    validity,
+)
 
 __all__ = [
     "GENTLE_SLOPE", "STEEP_SLOPE", "HeightField", "LoadOptions", "Recipe", "Source",
-    "coherence", "dominant_periods", "order_powers",
+    "coherence", "dominant_periods", "field", "jumping_lines", "lengths", "order_powers",
+    "preprocess", "read", "recipes", "scatter", "source", "spectra", "stands_in_full",
+    "units_warning", "validity",
 ]  # fmt: skip
 
 # Attached here: their modules import the class, so the class cannot import them.

@@ -21,5 +21,5 @@ display    linear sRGB to the values of a screen, by a view
 
 __all__ = [
     "arithmetic", "blend", "boundary", "coat", "colour", "display", "fresnel", "geometry",
-    "materials", "mirror", "orders", "paths", "stack", "through",
+    "lobes", "materials", "mirror", "orders", "paths", "stack", "through",
 ]  # fmt: skip

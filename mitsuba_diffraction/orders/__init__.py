@@ -25,12 +25,22 @@ solve          solvers: from a profile to a table
 
 from __future__ import annotations
 
-from .efficiency import efficiency, groove_efficiency, jones, mueller, polarised_efficiency
+from .efficiency import (
+    efficiency,
+    groove_efficiency,
+    jones,
+    lookup_in,
+    mueller,
+    polarised_efficiency,
+)
 from .file import load_orders, save_orders
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
-__all__ = ["Band", "CellResponse", "ListedResponse", "OrderTable", "cells"]
+__all__ = [
+    "Band", "CellResponse", "ListedResponse", "OrderTable", "cells", "daylight", "file", "imported",
+    "listing", "lookup", "lookup_in", "rows",
+]  # fmt: skip
 
 # Modules that build on the class; it shall not import them
 OrderTable.efficiency = efficiency

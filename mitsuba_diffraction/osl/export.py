@@ -21,7 +21,7 @@ from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES, linear_srgb, response
 from ..orders import OrderTable
 from ..plugin.description import Consumer, Feature, Surface
-from ..tables.exr import write_channels
+from ..tables import write_channels
 from .formulas import order_formulas, patch_formulas, shader_file
 from .patch import (
     energy_texture,

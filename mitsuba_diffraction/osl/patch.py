@@ -12,9 +12,9 @@ from ..optics.coat import coated_reflectance, cosine_within, face_transmittance
 from ..optics.fresnel import reflectance
 from ..plugin.description import Surface
 from ..shading.powers import PackedPowers, pack_powers
+from ..tables import DiffractionTable
 from ..tables.directional import FINE, SHARE
 from ..tables.powers import powers_at
-from ..tables.table import DiffractionTable
 
 #: Orders drawn in a sample, each of a wavelength.
 DRAWS = 2

@@ -29,6 +29,7 @@ pigment         pigment beneath a structure, of a colour or a measured spectrum
 power           the diffracted power at single wavelengths
 rgb             power and look-up in the RGB variants' colours
 device_table    a table inside a kernel: `DeviceTable`
+height_derivatives  a table's coefficients as functions of the heights in `data`
 series          series in κ: weights of a bin's terms, and order 0
 sampling        directions drawn where the orders are
 window_positions  where on the patch the window sits at a point of the surface
@@ -43,4 +44,9 @@ types           names of the types of arguments
 
 import mitsuba  # noqa: F401 - before the modules here: the import registers them (`when_imported`)
 
-__all__ = ["description", "installed", "memory", "parameters", "presets"]
+__all__ = [
+    "arithmetic", "base", "boundary", "conductors", "description", "device_table", "dictionary",
+    "diffraction", "directions", "installed", "loops", "memory", "parameter_changes",
+    "parameters", "pigment", "presets", "properties", "registration", "sampling", "sources",
+    "textures", "types",
+]  # fmt: skip

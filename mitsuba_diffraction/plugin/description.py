@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError, warn
-from ..heights.field import HeightField
+from ..heights import HeightField
 from ..optics.geometry import sigma_of
+from ..tables import DiffractionTable
 from ..tables.directional import DirectionalTable
-from ..tables.table import DiffractionTable
 from .types import BSDF, Interaction, Texture
 
 

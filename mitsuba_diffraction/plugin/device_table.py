@@ -17,9 +17,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from ..tables import DiffractionTable
 from ..tables.layout import BinRecord
 from ..tables.powers import as_powers
-from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .arithmetic import index_of, maximum
 from .height_derivatives import DifferentiableHeights

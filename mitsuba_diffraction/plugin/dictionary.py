@@ -9,8 +9,8 @@ import mitsuba as mi
 
 from ..errors import DiffractionError, check_choice, quoted
 from ..files import FileKind, kind_of
-from ..heights.field import HeightField
-from ..tables.table import DiffractionTable
+from ..heights import HeightField
+from ..tables import DiffractionTable
 from .description import SolvedOrders
 
 #: BSDFs of a single height field.

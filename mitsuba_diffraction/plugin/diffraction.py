@@ -11,7 +11,7 @@ filename : string
     of `mitsuba-diffraction precompute`.
 data : mi.TensorXf
     Instead: heights, µm, shape (ny, nx); in dictionaries only. `md.bsdf_dict` passes a HeightField.
-    `mi.traverse` has it: other heights make another table; for derivatives see below.
+    `mi.traverse` has it: other heights make another table.
 pixel_size : float or string [from the file]
     Distance between heights, µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
@@ -79,15 +79,15 @@ material : string or float
     Tissue or liquid (`keratin`, `chitin`, `melanin`, `guanine`, `water`, `SiO2`, `MgF2`), index
     (`1.56`, `1.56+0.05i`), conductor (`Au`, `gold`), or `none` (R = 1).
 eta, k : spectra ∂
-    Instead: complex refractive index of a conductor.
+    Instead: complex index of a conductor.
 int_ior, ext_ior : float or string [1.5, 1.000277]
-    Indices of the default dielectric and of the surrounding medium, or names such as `water`. Their
+    Indices of the default dielectric and of the surrounding medium, or names (`water`). Their
     ratio is the differentiable `eta`.
 coat_ior : float or string [none]
     Index of a flat clear layer over the structure, too thick to interfere: 1.58 (lacquer), `water`.
     Relative index: the differentiable `coat_eta`.
 film_ior : float or string [none]
-    Index of a thin film that follows the heights and interferes, as an oxide. Relative index: the
+    Index of a thin film that follows the heights and interferes. Relative index: the
     differentiable `film_eta`. Excludes a coat.
 film_thickness : float or texture ∂ [none]
     Along the vertical, nm; 2 n d is at most 12 µm. Or a picture, raw texture or mesh attribute,
@@ -126,7 +126,7 @@ factor of the material:
 
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩
 
-**Heights.** Treatments are applied in the order crop, fill, level, clip. Order 0 has the coherence
+**Heights.** The order of treatments is crop, fill, level, clip. Order 0 has the coherence
 width on any scan; other orders have at most the width of the scan's windows (Welch 1967).
 
 **Scales.** coherence_width applies at the largest lateral_scale, or at 1 if none is larger;
@@ -146,19 +146,18 @@ dark.
 
 **Films and stacks.** Scales of energy under a texture of thicknesses from 100 to 600 nm take a
 minute, once; beyond 82° single thicknesses send on up to 1.09 of the light. RGB variants sum the
-film's colours over wavelengths, apart from the orders. A stack's `spread` is the standard deviation
-of all thicknesses from place to place, as a share: `layers = [["chitin", 0.09], ["1.33", 0.08]]`.
+film's colours over wavelengths, apart from the orders. A stack's `spread` is the thicknesses'
+standard deviation from place to place, as a share: `layers = [["chitin", 0.09], ["1.33", 0.08]]`.
 Stacks exclude a nested BSDF if they absorb. Under a spread, polarised variants keep the mean phase
 between s and p.
 
-**Energy.** Dielectrics are unaffected; metal gratings lose some per cent in directions without gain
-(docs/energy.md). The scale costs seconds once and is cached. It is interpolated over height_scale.
-For its derivative, enable the derivative of height_scale before parameters.update(). Derivatives by
-indices and films hold it constant, in steps of 5 nm of film_thickness.
+**Energy.** Metal gratings lose some per cent in directions without gain (docs/energy.md). The scale
+takes seconds, once, and is interpolated over height_scale. For its derivative, enable that of
+height_scale before parameters.update(). Derivatives by indices and films hold it constant, in steps
+of 5 nm of film_thickness.
 
-**Derivatives by heights** in renderings take data, `periodic=exact`, `basis=chebyshev`,
-`model=kirchhoff`, `energy_conserving=false`, no BSDF beneath, a spectral or mono variant and a
-window about as wide as the patch.
+**Derivatives by data** take `periodic=exact`, `basis=chebyshev`, `model=kirchhoff`,
+`energy_conserving=false`, nothing beneath, no RGB variant and a wide window.
 
 **The light beneath** is multiplied by T(ωi) T(ωo), T = 1 − a with the albedo a of the surface and
 its coat. Spectra of pigments are constant beyond their ends.

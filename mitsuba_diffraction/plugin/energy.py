@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..optics import fresnel
 from ..optics.coat import coated_reflectance, cosine_within
 from ..optics.stack import Stacked
+from ..tables import DiffractionTable
 from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy import conserved
 from ..tables.energy.conservation import Conservation, Energy
-from ..tables.table import DiffractionTable
 from .arithmetic import plain
 from .boundary import Boundary
 from .direction_lookup import DirectionLookup, at_horizon, between, ones_like, scales_of

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Real
+from ..tables import DiffractionTable
 from ..tables.build.derivatives import HeightDerivatives
 from ..tables.layout import BinRecord
-from ..tables.table import DiffractionTable
 from .memory import tensor, upload
 from .types import Buffer
 

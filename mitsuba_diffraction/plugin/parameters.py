@@ -12,14 +12,14 @@ import mitsuba as mi
 
 from ..errors import DiffractionError, warn
 from ..files import readable_file
+from ..heights import LoadOptions
 from ..heights.lengths import numbers_of
-from ..heights.read import LoadOptions
 from ..llvm import require_loaded_llvm
 from ..optics.boundary import MODELS
 from ..optics.materials import PERFECT, TISSUES, index_at_sodium, material_named
 from ..retired import retired
 from ..settings import COHERENCES, SURFACE
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable
 from .arithmetic import plain
 from .description import Feature
 from .dictionary import ORDERS, PLUGINS

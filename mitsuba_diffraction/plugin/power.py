@@ -13,7 +13,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..optics.geometry import wavenumber
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable
 from .device_table import DeviceTable, device_table
 from .directions import Pair, PairThrough, TablePoint
 from .height_derivatives import DifferentiableHeights

@@ -15,9 +15,9 @@ import numpy as np
 
 from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.geometry import wavenumber
+from ..tables import DiffractionTable
 from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour.table import PACKET, TERMS, ColourTable, cached_colours
-from ..tables.table import DiffractionTable
 from .arithmetic import index_of, maximum, minimum
 from .directions import Pair, PairThrough, TablePoint
 from .memory import index_between, once_a_table, read, read_record, upload

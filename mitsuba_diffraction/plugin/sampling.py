@@ -21,8 +21,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..tables import DiffractionTable
 from ..tables.sampling import BANDED, SHIFT, proposals
-from ..tables.table import DiffractionTable
 from .arithmetic import clip, float_of, index_of, maximum, minimum
 from .memory import float_of_bits, index_between, once_a_table, read, upload
 from .types import Buffer, Float, Index, Vector2f, Vector3f

@@ -13,9 +13,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ..tables import DiffractionTable
 from ..tables.expansion import Expansion
 from ..tables.layout import BinRecord, cells_of, functions_at
-from ..tables.table import DiffractionTable
 from .arithmetic import clip, index_of, minimum
 from .memory import PACKET, index_between, read_record, upload
 from .types import Buffer, Float, Index

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError, warn
 from ..files import FileKind
-from ..heights.field import HeightField
+from ..heights import HeightField, LoadOptions
 from ..heights.lengths import is_auto
 from ..heights.preprocess import fill_missing
-from ..heights.read import LoadOptions, fill_method, treat
+from ..heights.read import fill_method, treat
 from ..settings import SURFACE, checked
-from ..tables.source import TableSource, loaded_table
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable, TableSource
+from ..tables.source import loaded_table
 from .dictionary import Data
 from .parameter_changes import GivenHeights
 from .parameters import READING, SOURCES, TABLE, coherence_of, resolved_path

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable
 from .arithmetic import index_of
 from .directions import PatchFrame
 from .memory import index_between

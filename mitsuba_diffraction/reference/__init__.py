@@ -29,6 +29,6 @@ from .screens import Sigmas
 from .transmission import btdf
 
 __all__ = [
-    "COHERENCES", "MODELS", "Sigmas", "boundary", "brdf", "btdf", "coat", "fresnel", "model",
-    "mueller", "orders_brdf", "screen_power", "through", "window_power",
+    "COHERENCES", "MODELS", "Sigmas", "arguments", "boundary", "brdf", "btdf", "coat",
+    "fresnel", "model", "mueller", "orders_brdf", "screen_power", "through", "window_power",
 ]  # fmt: skip

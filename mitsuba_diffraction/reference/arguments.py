@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
+from ..heights import HeightField
 from ..heights.coherence import widths_of, window_and_taper
-from ..heights.field import HeightField
 from ..optics.boundary import MODELS, checked_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Complex, Real
 from ..errors import DiffractionError
-from ..heights.field import HeightField
+from ..heights import HeightField
 from ..optics.blend import ScaleRoughness
 from ..optics.boundary import Heights, geometry
 from ..optics.boundary import model_of as registered_model

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Complex, Real
-from ..heights.field import HeightField
+from ..heights import HeightField
 from .model import Light, ensemble_power, window_sums
 from .screens import Orders, Sigmas, Sums, orders_near
 

@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Complex, Real
-from ..heights.field import HeightField
+from ..heights import HeightField
 from ..optics.blend import ScaleRoughness
 from ..optics.fresnel import Filmed, Index
 from .boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised

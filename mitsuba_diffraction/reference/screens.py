@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Complex, Real
+from ..heights import HeightField
 from ..heights.coherence import window_corners, window_places
-from ..heights.field import HeightField
 from ..heights.preprocess import plane_of
 
 #: σ_l over σ.

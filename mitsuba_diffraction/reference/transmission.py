@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
-from ..heights.field import HeightField
+from ..heights import HeightField
 from ..optics import through as formulas
 from ..optics.blend import ScaleRoughness
 from ..optics.geometry import wavenumber

@@ -31,6 +31,7 @@ from .passes import Stop, render_passes
 from .pictures import read_exr
 
 __all__ = [
-    "Stop", "frames", "hologram", "load_scene", "logo", "parameters", "passes", "pictures",
-    "read_exr", "render_passes", "set_variant", "stage",
+    "Stop", "additions", "bands", "denoise", "elements", "fitted_mesh", "frames", "hologram",
+    "label", "load", "load_scene", "logo", "meshes", "orbit", "parameters", "passes",
+    "pictures", "read_exr", "render_passes", "set_variant", "stage", "surfaces",
 ]  # fmt: skip

@@ -14,8 +14,7 @@ import numpy as np
 from ..errors import DiffractionError, warn
 from ..plugin.description import Surface
 from ..plugin.sources import SHORTEST_WAVELENGTH
-from ..tables.source import TableRequest, providing
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable, TableRequest, providing
 
 # Parameters of a film that its size and format follow from.
 _KEPT = (

@@ -21,7 +21,7 @@ from ..arrays import Single
 from ..atomic import atomic_path
 from ..errors import DiffractionError, quoted
 from ..images import read_picture
-from ..tables.exr import write_channels
+from ..tables import write_channels
 
 #: Quantity of the dots: of each label, from black to white, at each dot, or of all.
 Values = Mapping[int, float] | tuple[float, float] | NDArray[np.floating[Any]] | float

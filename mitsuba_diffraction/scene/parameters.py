@@ -91,7 +91,7 @@ def files_of(
 
     with_sources : whether recipes are read, for the files that they name.
     """
-    from ..heights.recipes import Recipe
+    from ..heights import Recipe
 
     files: dict[Path, None] = {}
     waiting = [scene]

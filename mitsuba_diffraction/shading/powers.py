@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..tables import DiffractionTable
 from ..tables.expansion import Expansion
 from ..tables.layout import BinRecord, cells_of, functions_at
 from ..tables.powers import order_0_power, power_series
-from ..tables.table import DiffractionTable
 
 #: Phase over a cell of κ, within which factors are interpolated linearly; the error is its square
 #: over 8, 1e-4.

@@ -31,8 +31,9 @@ from .source import TableRequest, TableSource, providing
 from .table import DiffractionTable
 
 __all__ = [
-    "GLOSSY_RADIUS", "DiffractionTable", "TableRequest", "TableSource", "directional", "powers",
-    "providing", "store", "window", "write_channels",
+    "GLOSSY_RADIUS", "DiffractionTable", "TableRequest", "TableSource", "directional",
+    "expansion", "fields", "layout", "lookup", "powers", "providing", "sampling", "source",
+    "store", "table", "window", "write_channels",
 ]  # fmt: skip
 
 # Modules that build on the class; it shall not import them

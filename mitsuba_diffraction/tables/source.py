@@ -15,8 +15,9 @@ from typing import Any
 
 from ..errors import DiffractionError, warn
 from ..files import FileKind
+from ..heights import Source
 from ..heights.coherence import LOOKUP, SHARPENING, TAPER
-from ..heights.source import Source, notes_line
+from ..heights.source import notes_line
 from ..progress import Progress, silent
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from .build.build import build_with

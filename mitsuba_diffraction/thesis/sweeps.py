@@ -15,10 +15,10 @@ import numpy as np
 
 from ..analysis.maps.result import BrdfMap, LightDirection
 from ..errors import DiffractionError
-from ..heights.field import HeightField
+from ..heights import HeightField
 from ..optics.colour import delta_e
 from ..progress import Progress
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable
 from .methods import NAMES, FullSpectrum, Gain, Method, make, make_all
 from .methods.make import method_map
 

@@ -13,7 +13,7 @@ from ..analysis.timing import quiet_bsdf
 from ..plugin.device_table import DeviceTable, Gaussians
 from ..plugin.memory import upload
 from ..plugin.types import Float, Index
-from ..tables.table import DiffractionTable
+from ..tables import DiffractionTable
 
 
 def thesis_bsdf(table: DiffractionTable | str | os.PathLike[str], **parameters: Any) -> Any:

@@ -127,7 +127,9 @@ def _members(value: object) -> str:
     if not isinstance(value, ModuleType):
         return ""
     names = [n for n in getattr(value, "__all__", []) if not n.startswith("_")]
-    shown = [f"`{name}`" for name in names if not isinstance(getattr(value, name), ModuleType)]
+    shown = [
+        f"`{name}`" for name in names if not isinstance(getattr(value, name, value), ModuleType)
+    ]
     more = f" and {len(shown) - _MOST} more" if len(shown) > _MOST else ""
     return ", ".join(shown[:_MOST]) + more
 

@@ -24,8 +24,7 @@ from ...arrays import Real
 from ...errors import DiffractionError
 from ...llvm import require_loaded_llvm
 from ...optics.geometry import wavenumber
-from ...orders import OrderTable
-from ...orders.efficiency import lookup_in
+from ...orders import OrderTable, lookup_in
 from ...orders.listing import orders_of
 from ...orders.lookup import Arrays
 from ...plugin.description import VARYING, Consumer, Feature, Surface

@@ -21,6 +21,6 @@ from .picture import contact_sheet, draw, save_exr, save_png
 from .result import Bands, BrdfMap, LightDirection
 
 __all__ = [
-    "Bands", "BrdfMap", "LightDirection", "brdf_map", "check_map", "check_variant", "contact_sheet",
-    "draw", "save_exr", "save_png",
+    "Bands", "BrdfMap", "LightDirection", "brdf_map", "check_map", "check_variant",
+    "contact_sheet", "draw", "hemisphere", "picture", "result", "save_exr", "save_png",
 ]  # fmt: skip

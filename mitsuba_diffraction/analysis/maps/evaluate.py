@@ -16,7 +16,7 @@ from ...optics.geometry import wavenumber
 from ...plugin.description import VARYING, Consumer, Feature, Surface, describe
 from ...plugin.memory import upload
 from ...progress import Progress, silent
-from ...tables.build.spectrum import GLOSSY_RADIUS
+from ...tables import GLOSSY_RADIUS
 from ..known_wavelengths import check_lit
 from . import hemisphere
 from .result import Bands, BrdfMap, LightDirection

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...atomic import atomic_path
-from ...tables.exr import write_channels
+from ...tables import write_channels
 from .result import BrdfMap
 
 if TYPE_CHECKING:

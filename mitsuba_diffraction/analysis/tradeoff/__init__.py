@@ -19,6 +19,6 @@ from .measuring import MeasuredSetting, TradeoffSetting, measure, settings
 from .report import Budget, recommended
 
 __all__ = [
-    "Budget", "MeasuredSetting", "TradeoffSetting", "lit_pairs", "measure", "measure_depths",
-    "measure_wavelengths", "recommended", "settings",
+    "Budget", "MeasuredSetting", "TradeoffSetting", "accuracy", "lit_pairs", "measure",
+    "measure_depths", "measure_wavelengths", "recommended", "report", "settings",
 ]  # fmt: skip

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...errors import DiffractionError
-from ...heights.field import HeightField
+from ...heights import HeightField
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...progress import Progress, silent
 from ...reference import window_power
 from ...reference.arguments import sigmas_of
-from ...tables.table import DiffractionTable, q_limit_of
+from ...tables import DiffractionTable
+from ...tables.table import q_limit_of
 
 #: Steps of a sum over wavelengths, nm.
 STEPS = (2.0, 5.0, 10.0, 20.0, 40.0)

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...heights.field import HeightField
+from ...heights import HeightField
 from ...plugin.memory import upload
 from ...progress import Progress, silent
+from ...tables import DiffractionTable
 from ...tables.colour.table import power_colour_difference
-from ...tables.table import DiffractionTable
 from ..timing import Queries, kernel_seconds, quiet_bsdf, ratio, rounds_of
 from .accuracy import Sample
 

@@ -8,3 +8,7 @@ lobes               a table's look-up inside a kernel, light of all orders in a 
 daylight_lobes      the same in RGB variants, summed over daylight
 polarised_lobes     Mueller matrices in polarised variants
 """
+
+from __future__ import annotations
+
+__all__ = ["diffraction_orders"]

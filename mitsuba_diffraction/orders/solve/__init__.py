@@ -35,6 +35,7 @@ from .stations import CrossedStation, Grating, Solver, Station
 
 __all__ = [
     "Chandezon", "CoupledWaves", "CrossedStation", "CrossedWaves", "Grating", "IntegralSolver",
-    "Settings", "SolvedRecipe", "Solver", "Station", "jobs", "material_of",
-    "profiles", "read_layers", "sheet_efficiencies",
+    "Settings", "SolvedRecipe", "Solver", "Station", "accuracy", "films", "grating_index",
+    "jobs", "material_of", "orders", "profiles", "read_layers", "recipes", "settings",
+    "sheet_efficiencies",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Complex, Real
 from ...errors import DiffractionError, check_choice, quoted
-from ...heights.field import HeightField
+from ...heights import HeightField
 from .. import cells
 from ..cells import Counts
 from ..polarised import mueller_of

@@ -32,7 +32,7 @@ from typing import Any
 
 from ...errors import DiffractionError, check_keys, quoted
 from ...files import path_beside, read_toml
-from ...heights.field import HeightField
+from ...heights import HeightField
 from ...heights.lengths import number_between
 from ...heights.recipes import SOLVED
 from ..table import WAVELENGTHS

@@ -37,11 +37,17 @@ if TYPE_CHECKING:
     from .export import export_shader
     from .renderer import Renderer
 
-__all__ = ["Renderer", "export_shader"]
+__all__ = [
+    "Renderer", "export", "export_shader", "methods", "packing", "scene", "shader_materials",
+    "texels",
+]  # fmt: skip
+
+
+#: Names whose modules --help does without.
+_LATER = {"Renderer": "renderer", "export_shader": "export"}
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:  # whose modules --help does without
-        module = {"Renderer": "renderer", "export_shader": "export"}[name]
-        return getattr(importlib.import_module(f"{__name__}.{module}"), name)
+    if name in _LATER:
+        return getattr(importlib.import_module(f"{__name__}.{_LATER[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -14,7 +14,7 @@ import numpy as np
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Surface
-from ...tables.exr import write_channels
+from ...tables import write_channels
 from .maps import Map
 from .methods import method_tables
 from .packing import pack_responses

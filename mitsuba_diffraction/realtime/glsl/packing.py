@@ -17,10 +17,10 @@ from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
 from ...shading.powers import pack_powers as pack_orders
+from ...tables import DiffractionTable
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
-from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.

@@ -239,7 +239,7 @@ def load(scene: Any) -> Any:
                 f"({mi.variant()}); give mi.load_file(...) or mi.load_dict(...), or an XML file"
             )
         return scene
-    from ...scene.load import load_scene, set_variant
+    from ...scene import load_scene, set_variant
 
     if mi.variant() is None:
         set_variant(None)

@@ -17,4 +17,7 @@ from .measures import Difference, difference, exposure_of
 from .report import plain_number
 from .run import Comparison
 
-__all__ = ["Comparison", "Difference", "delta_e", "difference", "exposure_of", "plain_number"]
+__all__ = [
+    "Comparison", "Difference", "delta_e", "difference", "exposure_of", "plain_number",
+    "report", "run",
+]  # fmt: skip

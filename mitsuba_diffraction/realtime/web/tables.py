@@ -15,9 +15,9 @@ from ...orders.cells import Counts
 from ...orders.rows import kinds_of, middles, rows, wavelength_of
 from ...plugin.description import Surface
 from ...progress import Progress
+from ...tables import DiffractionTable
 from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
 from ...tables.powers import power_series, powers_at
-from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import cells_within, pack_orders

@@ -25,6 +25,7 @@ from .trimesh import (
 
 __all__ = [
     "GUIDES", "DirectionField", "MeshFile", "TangentReport", "TriangleMesh", "cell_corners",
-    "check_tangents", "direction_field", "grid_faces", "load_mesh", "load_orientation",
-    "oriented_mesh", "read_mesh", "texture_tangents", "write_ply",
+    "check_tangents", "direction_field", "directions", "grid_faces", "load_mesh",
+    "load_orientation", "mesh_files", "oriented_mesh", "read_mesh", "tangents",
+    "texture_tangents", "trimesh", "write_ply",
 ]  # fmt: skip

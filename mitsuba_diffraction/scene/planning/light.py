@@ -24,8 +24,7 @@ from ...plugin.description import Surface, describe
 from ...plugin.directions import Pair, Site
 from ...plugin.memory import tensor, upload
 from ...plugin.types import BSDF, Context, Float, Mask, Powers, Spectrum
-from ...tables.source import TableRequest, providing
-from ...tables.table import DiffractionTable
+from ...tables import DiffractionTable, TableRequest, providing
 from ..elements import own_id, parts_of
 from ..load import shrink
 

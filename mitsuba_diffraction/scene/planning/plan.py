@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import DiffractionError
-from ...heights.recipes import Recipe
+from ...heights import Recipe
 from ...settings import RECIPE_SETTINGS, TableSettings
-from ...tables.source import TableRequest, providing
-from ...tables.table import DiffractionTable
+from ...tables import DiffractionTable, TableRequest, providing
 from .light import Load, TableLight
 
 #: Settings that a plan chooses.

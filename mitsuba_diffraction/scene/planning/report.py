@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Real
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
-from ...tables.table import DiffractionTable
+from ...tables import DiffractionTable
 from .light import BINS, WAVELENGTHS
 from .plan import PlannedTable, quantiles
 

@@ -10,5 +10,10 @@ powers        the mean power of screens, by batches, on workers if given
 spectrum      DFT of exp(iκh) at some κ, cropped to the orders that light can reach
 coefficients  of the series, from transforms of the heights; as half floats
 error         the one error measure of the project
+derivatives   of the coefficients by the heights of a patch that tiles the plane
 describe      statistics of the heights that a table stores, and what tells hills from pits
 """
+
+from __future__ import annotations
+
+__all__ = ["build", "checks", "derivatives"]

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError, warn
+from ...heights import HeightField, units_warning
 from ...heights.coherence import resolved
-from ...heights.field import HeightField
-from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
 from ...progress import Progress, silent
 from ...settings import MAX_TAPS, TableSettings, checked

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import DiffractionError
+from ...heights import HeightField, units_warning
 from ...heights.coherence import SEVERAL, resolved, window_warning
-from ...heights.field import HeightField
-from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
 from ...settings import MAX_TAPS, TableSettings
 from ..document import MAX_BYTES

@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...heights.field import HeightField
+from ...heights import HeightField
 from ..expansion import Expansion, principal_functions
 from ..table import build_error
 from .error import FLOOR

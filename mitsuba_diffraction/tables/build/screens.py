@@ -23,8 +23,8 @@ import scipy
 from numpy.typing import NDArray
 
 from ...arrays import Real
+from ...heights import HeightField
 from ...heights.coherence import SHARPENING, TAPER, window_corners, window_places
-from ...heights.field import HeightField
 from ...heights.preprocess import plane_of
 from ...optics.blend import ScaleRoughness
 from ...optics.geometry import sigma_of, wavenumber

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...heights.field import HeightField
+from ...heights import HeightField
 
 #: What fades at the edges, along y and x.
 Tapers = tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]

@@ -9,4 +9,4 @@ proposals   densities to draw directions from, by brightness
 
 from .table import ColourTable, cached_colours, colour_difference
 
-__all__ = ["ColourTable", "cached_colours", "colour_difference"]
+__all__ = ["ColourTable", "build", "cached_colours", "colour_difference", "proposals", "table"]

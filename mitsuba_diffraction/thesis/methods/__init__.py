@@ -27,5 +27,5 @@ from .periods import Period, estimate_periods
 
 __all__ = [
     "NAMES", "FullSpectrum", "Gain", "Method", "OrdersOnly", "Period", "Rainbow", "Repeated",
-    "estimate_periods", "make", "make_all", "method_map",
+    "estimate_periods", "make", "make_all", "method", "method_map", "periods",
 ]  # fmt: skip

@@ -13,15 +13,13 @@ import numpy as np
 from ...analysis.maps import hemisphere
 from ...analysis.maps.result import Bands, BrdfMap, LightDirection
 from ...errors import check_choice
+from ...heights import HeightField
 from ...heights.coherence import resolved_width
-from ...heights.field import HeightField
 from ...optics.geometry import wavenumber
 from ...progress import Progress, silent
 from ...settings import TableSettings
+from ...tables import GLOSSY_RADIUS, DiffractionTable, TableSource
 from ...tables.build.checks import TAPS_SHARE
-from ...tables.build.spectrum import GLOSSY_RADIUS
-from ...tables.source import TableSource
-from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
 from .method import FullSpectrum, Gain, Method, trapezoid_rule
 from .periodic import OrdersOnly, Rainbow, Repeated

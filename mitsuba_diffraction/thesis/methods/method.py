@@ -33,7 +33,7 @@ from ...errors import DiffractionError, check_choice
 from ...optics.colour import linear_srgb, response
 from ...optics.geometry import diffraction_coordinates, kirchhoff_factor, wavenumber
 from ...progress import Progress
-from ...tables.table import DiffractionTable
+from ...tables import DiffractionTable
 
 SHADOWINGS = ("none", "vcavity")
 

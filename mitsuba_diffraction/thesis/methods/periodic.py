@@ -16,9 +16,8 @@ from ...arrays import Real
 from ...errors import DiffractionError, check_choice
 from ...optics.colour import response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
-from ...tables.build.spectrum import GLOSSY_RADIUS
+from ...tables import GLOSSY_RADIUS, DiffractionTable
 from ...tables.lookup import Kernel, order_0_sum, weighted_sum
-from ...tables.table import DiffractionTable
 from .method import SPECULAR_WAVELENGTH, FullSpectrum, Gain, Method, UniformMethod
 from .periods import Period
 

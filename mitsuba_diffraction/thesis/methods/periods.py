@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...heights.field import HeightField
+from ...heights import HeightField
 
 #: Least confidence of a usable period: the ring-shaped autocorrelation of a random surface reaches
 #: 0.1 by chance, snake scales across their fingers 0.5 and more.

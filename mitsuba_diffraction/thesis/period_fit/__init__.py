@@ -33,6 +33,6 @@ from .ridge import (
 from .windows import thesis_fit, window_fits
 
 __all__ = [
-    "FEWEST", "Beam", "Fit", "Response", "Ridge", "draw", "find_period", "fit_period", "measure",
-    "ridge_of", "thesis_fit", "window_fits",
+    "FEWEST", "Beam", "Fit", "Response", "Ridge", "draw", "find_period", "fit_period",
+    "measure", "plot", "ridge", "ridge_of", "thesis_fit", "window_fits", "windows",
 ]  # fmt: skip

@@ -18,7 +18,7 @@ from ...arrays import Real
 from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...progress import Progress
-from ...tables.table import DiffractionTable
+from ...tables import DiffractionTable
 from ..methods.method import Gain
 from .ridge import Beam, Fit, fit_period, measure, ridge_of
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import DiffractionError
-from ...heights.field import HeightField
+from ...heights import HeightField
 from ...realtime.glsl.packing import area_factor
 from ...realtime.glsl.texels import Packed, as_half, listed, texels
-from ...tables.table import DiffractionTable
+from ...tables import DiffractionTable
 from ..methods import FullSpectrum, OrdersOnly, Repeated, make
 from ..methods.method import SPECULAR_WAVELENGTH, Method
 
