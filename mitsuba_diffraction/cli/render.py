@@ -19,6 +19,7 @@ from ..scene.frames import (
     FILMS,
     Frame,
     check_film,
+    check_frames,
     digest_of,
     render_frames,
     write_film,
@@ -268,16 +269,16 @@ def _run_frames(args: argparse.Namespace) -> Figures:
     say_why(reasons)
 
     done, workers = 0, None
-    if to_do and on_workers(args):
-        done, workers = _frames_on_workers(args, to_do, folder)
-    elif to_do:
+    if to_do:
         variant = set_variant(args.mode)
-        with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
-            bar(0, 0, "loading")
-            for _ in render_frames(
-                args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
-            ):
-                done += 1
+        with mitsuba_warnings():
+            with Bar(args, delay=0) as bar:
+                bar(0, 0, "checking the frames")
+                check_frames(args.scene, to_do)
+            if on_workers(args):
+                done, workers = _frames_on_workers(args, to_do, folder, variant)
+            else:
+                done = _frames_here(args, to_do, variant)
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
               "interrupted": done < len(to_do), "seconds": elapsed(args),
@@ -297,15 +298,25 @@ def _run_frames(args: argparse.Namespace) -> Figures:
     return report | {"film": film}
 
 
+def _frames_here(args: argparse.Namespace, to_do: Sequence[Frame], variant: str) -> int:
+    """Render frames in this process; return how many were finished."""
+    with Bar(args, unit=" spp", delay=0) as bar:
+        bar(0, 0, "loading")
+        frames = render_frames(
+            args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
+        )  # fmt: skip
+        return sum(1 for _ in frames)
+
+
 def _frames_on_workers(
-    args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
+    args: argparse.Namespace, to_do: Sequence[Frame], folder: Path, variant: str
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; return how many were finished, and what the workers did."""
     from ..cluster.frames import FrameRequest
 
-    variant, done = set_variant(args.mode), 0
+    done = 0
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
-    with mitsuba_warnings(), client_of(args) as client:
+    with client_of(args) as client:
         film = film_of(args, client, wanted, variant, folder / "passes")
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for frame, result in zip(to_do, film.render(stop, bar), strict=False):
