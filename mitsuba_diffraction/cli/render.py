@@ -32,7 +32,7 @@ from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
 from .animation import ANIMATION, say_why
 from .console import Bar, mitsuba_warnings, say, say_warning
-from .interrupt import INTERRUPTED
+from .interrupt import INTERRUPTED, keep_in_mind
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
 from .report import Figures, check_outputs, default_output, elapsed, output_name, output_of
@@ -153,6 +153,7 @@ def _on_workers(args: argparse.Namespace) -> Figures:
 
     variant = set_variant(args.mode)
     keep = outputs.named.with_name(f"{outputs.named.name}.passes")
+    keep_in_mind(f"finished passes are kept in '{keep}': run the command again to go on")
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
         if outputs.only_png:
@@ -162,9 +163,7 @@ def _on_workers(args: argparse.Namespace) -> Figures:
                 report = _finish(args, result, outputs, variant, film.scene)
                 film.forget(0)
                 return report | {"workers": say_report(film)}
-    say(f"interrupted; finished passes are kept in '{keep}': run the command again to go on")
-    args.code = INTERRUPTED
-    return {}
+    raise KeyboardInterrupt
 
 
 def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
@@ -275,6 +274,7 @@ def _run_frames(args: argparse.Namespace) -> Figures:
             with Bar(args, delay=0) as bar:
                 bar(0, 0, "checking the frames")
                 check_frames(args.scene, to_do)
+            keep_in_mind(f"finished frames are in '{folder}': run the command again to continue")
             if on_workers(args):
                 done, workers = _frames_on_workers(args, to_do, folder, variant)
             else:

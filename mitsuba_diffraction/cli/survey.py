@@ -15,7 +15,7 @@ from ..scene.load import set_variant
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
-from .interrupt import INTERRUPTED
+from .interrupt import keep_in_mind
 from .options import number_between, whole_number
 from .report import Figures, elapsed, output_of
 from .workers import THREADS, WORKERS, client_of, on_workers, say_files, worker_threads
@@ -51,13 +51,7 @@ _SIZES = 1.5
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Measure new scans, and return the figures."""
-    try:
-        rows = _measured(args)
-    except KeyboardInterrupt:
-        folder = args.output or "survey"
-        say(f"interrupted; finished scans are in '{folder}': run the command again to go on")
-        args.code = INTERRUPTED
-        return {}
+    rows = _measured(args)
     for row in rows:
         if row["reason"]:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
@@ -111,6 +105,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
 
     args.files = scan_files(args.files)
     args.output = output_of(args, Path("survey"), files_in, make_folder=True)
+    keep_in_mind(f"finished scans are in '{args.output}': run the command again to go on")
 
     from ..analysis.scans import check_surface
     from ..analysis.survey import run_survey
