@@ -104,8 +104,8 @@ def compare(args: argparse.Namespace) -> Figures:
 
     variant = _set_variant(args)
     every = "all" in args.method
-    with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
-        bar(0, args.spp, "loading")
+    with mitsuba_warnings(), Bar(args, delay=0) as bar:
+        bar(0, 0, "loading")
         comparison = Comparison(
             _scene(args, parameters), str(args.scene), variant, folder, args.sensor, args.spp,
             args.full_spp, args.frames // 4 * 4, args.supersampling, args.seed, bar,
