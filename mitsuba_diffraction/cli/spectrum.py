@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> Figures:
     everything = files_of_spectra.on_common_wavelengths(
         {name: parts for name, (_, parts) in measured.items()}
     )
-    if any(s.wavelength.size < lam.size for s in everything[first]):
+    if len(files) > 1 and everything[first][0].wavelength.size < lam.size:
         common = everything[first][0].wavelength
         say(f"columns are from {common[0]:g} to {common[-1]:g} nm, which every table has")
     spectra = {name: mean_spectra(parts) for name, parts in everything.items()}

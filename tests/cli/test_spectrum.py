@@ -67,6 +67,20 @@ def test_the_table_serves_the_heights_that_are_asked_for(run, scans, asked):
     assert agrees is (asked[0] == "--height-scale")
 
 
+@pytest.mark.parametrize("file", ["orders.nc", "t.exr"])
+def test_wavelengths_that_a_table_lacks_are_refused_if_they_were_asked_for(run, world, file):
+    """Of the default range they are left out, in one line: of both kinds of tables."""
+    how = ["--light", "10", "--detector", "0", "--step", "50", "-o", "out.csv"]
+    ran = run("spectrum", file, *how)
+    assert ran.code == 0, ran.err
+    assert ran.err.count(": other wavelengths are left out") == 1
+    (world / "out.csv").unlink()
+    line = run("spectrum", file, *how, "--wavelength-range", "310:650").failed_in_one_line()
+    assert f"'{file}' has light from " in line
+    assert "and the wavelengths are " in line
+    assert not (world / "out.csv").exists()
+
+
 def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
     ran = run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv")
     assert ran.code == 0, ran.err
