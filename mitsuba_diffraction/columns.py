@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Real
 from .atomic import atomic_path
-from .errors import DiffractionError, printable, quoted
+from .errors import DiffractionError, counted, printable, quoted
 from .files import readable_file
 from .limits import LARGEST_LISTING, bounded_lines
 
@@ -201,7 +201,7 @@ def parse_columns(lines: Iterable[str], shown: str) -> Columns:
         cells = split(row_text)
         if rows and len(cells) != len(rows[0]):
             raise DiffractionError(
-                f"{shown}, line {place}: {len(cells)} numbers where the first row has "
+                f"{shown}, line {place}: {counted(len(cells), 'number')} where the first row has "
                 f"{len(rows[0])}"
             )
         row, strange = _row(cells)

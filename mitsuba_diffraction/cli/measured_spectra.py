@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..files import FileKind
 from ..settings import TableSettings
 from . import options
@@ -63,7 +63,7 @@ class Measurement:
     def say_notes(self) -> None:
         """Print the number of scans with notes, beside the notes of the first scan."""
         if self._noted > 1:
-            others = "1 more scan" if self._noted == 2 else f"{self._noted - 1} more scans"
+            others = counted(self._noted - 1, "more scan")
             say(f"notes on {others}: 'mitsuba-diffraction info' prints them")
 
     def _treatment(self, file: Path) -> Treatment:
@@ -91,7 +91,7 @@ class Measurement:
             )
         # a table of heights serves all light above its shortest wavelength
         heights = isinstance(table, DiffractionTable)
-        low, high = table.wavelength_range[:1] + (math.inf,) if heights else table.wavelengths
+        low, high = (table.wavelength_range[0], math.inf) if heights else table.wavelengths
         lam = self._within(low, high, file)
         return self._spectrum(table, self.geometry, lam, angular=args.iridescence)
 

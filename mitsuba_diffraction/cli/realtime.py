@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..realtime.glsl.methods import METHODS, WEB_METHODS
 from ..scene.load import load_scene, sensor_of, set_variant
 from ..thesis import shaders  # noqa: F401 - registers its methods
@@ -206,7 +206,7 @@ def export_shader(args: argparse.Namespace) -> Figures:
     code, *textures = (file.stat().st_size for file in files)
     print(
         f"{folder}: {', '.join(shader.functions.values())}: {code / 1e3:.1f} kB of GLSL, "
-        f"{len(textures)} textures of {sum(textures) / 1e6:.1f} MB, "
+        f"{counted(len(textures), 'texture')} of {sum(textures) / 1e6:.1f} MB, "
         f"{elapsed(args):.1f} s; {shader.surface}"
     )
     return {"source": args.source, "folder": folder, "files": files,

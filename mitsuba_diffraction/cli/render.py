@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..extras import optional
 from ..scene.denoise import denoised
 from ..scene.elements import surfaces_text
@@ -190,7 +190,7 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
         if result.spp == 0:
             raise KeyboardInterrupt  # interrupted before the first pass, without a picture
         if result.interrupted:
-            say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
+            say(f"interrupted; the picture has {result.spp} of {counted(spp, 'sample')} per pixel")
             args.code = INTERRUPTED
         report = _finish(args, result, outputs, variant, scene, eye)
         if args.denoise:
@@ -206,7 +206,7 @@ def _finish(
 ) -> Figures:  # fmt: skip
     """Write the picture, print warnings and a summary, and return the figures for --json."""
     if bad := count_bad(result.bitmap):
-        say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
+        say_warning(f"{counted(bad, 'pixel')} not finite (NaN or infinite): black in a PNG")
     if eye is not None:
         return save_observed(args, eye, result, outputs.named, outputs.png, variant)
     written = []
@@ -220,7 +220,7 @@ def _finish(
     else:
         write_png(colours, outputs.png, args.exposure, args.view)
         written.append(outputs.png)
-    (width, height), samples = result.bitmap.size(), f"{result.spp} samples"
+    (width, height), samples = result.bitmap.size(), counted(result.spp, "sample")
     seconds, surfaces = elapsed(args), surfaces_text(scene)
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
@@ -291,7 +291,9 @@ def _run_frames(args: argparse.Namespace) -> Figures:
         )
         args.code = INTERRUPTED
         return report
-    print(f"{folder}: {len(frames)} frames, {done} of them new, {report['seconds']:.1f} s")
+    print(
+        f"{folder}: {counted(len(frames), 'frame')}, {done} of them new, {report['seconds']:.1f} s"
+    )
     if film is not None:
         write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")

@@ -75,15 +75,6 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def save_figure(path: Path, figure: Any, **how: Any) -> None:
-    """Write a figure of Matplotlib in the format of the suffix.
-
-    how : more arguments of `matplotlib.figure.Figure.savefig`.
-    """
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], **how)
-
-
 def save_report(args: argparse.Namespace, figures: Figures) -> None:
     """Write the file of --json, if it is requested and there are figures."""
     if figures and args.json not in (None, STDOUT):

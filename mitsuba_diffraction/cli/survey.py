@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..scene.load import set_variant
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
@@ -75,13 +75,15 @@ def run(args: argparse.Namespace) -> Figures:
     whole = sum("crop" not in row for row in rows if not row["reason"])
     if args.crops is not None and whole:
         say(f"{whole} of the scans have no crops of {WINDOW:g} µm and are measured as a whole")
-    measured = "scans" if args.crops is None else "crops and whole scans"
+    done, samples = len(rows) - failed, len({row["sample"] for row in rows})
+    measured = counted(done, "scan")
+    if args.crops is not None:
+        measured = counted(done, "crop or whole scan", "crops and whole scans")
     seconds = elapsed(args)
     surface = next((f"{row['surface']}, " for row in rows if not row["reason"]), "")
     print(
-        f"{args.output}: {len(rows) - failed} {measured} in "
-        f"survey.csv, {failed} failed, "
-        f"{len({row['sample'] for row in rows})} samples in samples.csv, {surface}{seconds:.1f} s"
+        f"{args.output}: {measured} in survey.csv, {failed} failed, "
+        f"{counted(samples, 'sample')} in samples.csv, {surface}{seconds:.1f} s"
     )
     args.code = 1 if failed else 0
     return {"rows": rows, "seconds": seconds}

@@ -10,11 +10,12 @@ from typing import Any
 
 from ..columns import save_rows
 from ..errors import DiffractionError, DiffractionWarning
+from ..images import save_figure
 from ..scene.load import set_variant
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
-from .report import Figures, beside, elapsed, output_of, save_figure
+from .report import Figures, beside, elapsed, output_of
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import counted
 from ..system import cores
 from .console import say, say_warning
 from .options import Group, refuse, whole_number
@@ -94,12 +95,13 @@ def say_report(film: FrameSequence) -> dict[str, Any]:
     """Print the workers' statistics in a line, and return them as plain data."""
     report = film.report.summary()
     kept = f", {report['kept']} stored before" if report["kept"] else ""
-    lost = f", {report['lost']} workers lost" if report["lost"] else ""
+    lost = f", {counted(report['lost'], 'worker')} lost" if report["lost"] else ""
     again = f", {report['retries']} given out again" if report["retries"] else ""
     print(
-        f"workers: {report['tasks']} tasks in {report['groups']} sums{kept}{again}{lost}, "
+        f"workers: {counted(report['tasks'], 'task')} in "
+        f"{counted(report['groups'], 'sum')}{kept}{again}{lost}, "
         f"{report['busy']:.1f} s of work by "
-        f"{len(report['workers'])} workers in {report['seconds']:.1f} s, "
+        f"{counted(len(report['workers']), 'worker')} in {report['seconds']:.1f} s, "
         f"{report['overhead_per_task_s']:.2g} s a task beside it, {report['bytes'] / 1e6:.3g} MB, "
         f"{report['peak'] / 1e9:.2g} GB of memory at most"
     )

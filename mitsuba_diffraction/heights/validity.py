@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Real
+from ..errors import counted
 from .field import LARGE, HeightField, blocks
 from .preprocess import MAD_TO_SIGMA, level_plane, level_quadratic, plane_of, plane_rise
 from .spectra import seen_slope
@@ -264,8 +265,9 @@ def _dust(field: HeightField) -> str:
     if without > WITHOUT_DUST * rms:
         return ""
     return (
-        f"{field.name}: use clip={CLIP} if they are dust or spikes: {int(outside.sum())} points "
-        f"({share:.2g} of all) are up to {np.abs(level - median).max():.3g} µm from the others, "
+        f"{field.name}: use clip={CLIP} if they are dust or spikes: "
+        f"{counted(int(outside.sum()), 'point')} ({share:.2g} of all) up to "
+        f"{np.abs(level - median).max():.3g} µm from the others, "
         f"and the RMS height is {rms:.3g} µm with them, {without:.3g} µm without"
     )
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, warn
+from ..errors import DiffractionError, counted, warn
 from ..extras import optional
 from ..files import refuse_pipe
 from ..progress import Progress
@@ -148,7 +148,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
         )
     bad = count_bad(bitmap)
     if bad:
-        warn(f"{frame.png}: {bad} pixels are not finite and black")
+        warn(f"{frame.png}: {counted(bad, 'pixel')} not finite, and black")
     frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
     if with_exr:
         write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": variant})

@@ -81,6 +81,22 @@ def test_wavelengths_that_a_table_lacks_are_refused_if_they_were_asked_for(run, 
     assert not (world / "out.csv").exists()
 
 
+@pytest.mark.parametrize("command", ["spectrum", "survey"])
+def test_results_of_an_earlier_run_beside_the_scans_are_left_out(run, scans, monkeypatch, command):
+    """As a shell names them for `spectrum *`, and in a folder."""
+    monkeypatch.chdir(scans)
+    for words in (["scan0.npy", "--observer", "dog"], ["--group", "a=scan?.npy"]):
+        assert run("spectrum", *words, *PIXEL, *QUICK[:2], "--step", "50").code == 0
+    results = sorted(name for name in os.listdir() if not name.endswith(".npy"))
+    assert len(results) == 9, results
+    for n, names in enumerate([sorted(os.listdir()), ["."]]):
+        ran = run(command, *names, *PIXEL, *QUICK[:2], "-o", scans.parent / f"{n}.csv")
+        assert ran.code == 0, ran.err
+        assert all(name in ran.err for name in results)
+    line = run(command, *results[:2], *PIXEL, "-o", scans.parent / "b.csv").failed_in_one_line()
+    assert f"'{results[0]}' is a plot or table of results, and no scan" in line
+
+
 def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
     ran = run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv")
     assert ran.code == 0, ran.err

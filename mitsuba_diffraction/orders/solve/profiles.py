@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Real
 from ...columns import read_columns
-from ...errors import DiffractionError, check_choice, quoted, warn
+from ...errors import DiffractionError, check_choice, counted, quoted, warn
 from ...files import FileKind, kind_of
 from ...heights.lengths import micrometres_of, number_between
 
@@ -221,7 +221,8 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
         raise DiffractionError(f"'{path}' has no points; expected {what}")
     if table.numbers.shape[1] != 2:
         raise DiffractionError(
-            f"'{path}', line {table.lines[0]}: {table.numbers.shape[1]} numbers; expected {what}"
+            f"'{path}', line {table.lines[0]}: {counted(table.numbers.shape[1], 'number')}; "
+            f"expected {what}"
         )
     factors = [micrometres_of(unit) if unit else 1.0 for unit in table.units]
     if None in factors:

@@ -124,7 +124,7 @@ def test_what_a_wide_patch_is_advised_to_do_helps():
 
 def test_a_series_too_short_for_any_number_of_intervals_is_refused():
     text = refused(terms=1, tolerance=1e-5)
-    assert "intervals of κ with 1 terms each still leave an error of" in text
+    assert "intervals of κ with 1 term each still leave an error of" in text
     assert text.endswith("give more terms or a larger tolerance")
 
 
