@@ -44,7 +44,7 @@ OTHER_MESHES = (".stl", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
 
 
 class FileKind(StrEnum):
-    """Kind of a file; all but the first five are heights, named by their reader."""
+    """Kind of a file; all but the first five and the last are heights, named by their reader."""
 
     TABLE = "table"
     ORDERS = "table of orders"

@@ -7,6 +7,7 @@ import math
 import os
 import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -209,7 +210,7 @@ def save_png(
     exposure : stops; by default `brdf_map.exposure()`.
     title, notes : see `figure`.
     """
-    save_figure(path, figure(brdf_map, exposure, title=title, notes=notes))
+    save_figure(Path(path), figure(brdf_map, exposure, title=title, notes=notes))
 
 
 def save_exr(
