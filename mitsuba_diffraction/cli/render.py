@@ -176,7 +176,7 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
     )
     with mitsuba_warnings():
         with Bar(args, unit=" spp", delay=0) as bar:
-            bar(0, args.spp or 0, "loading")
+            bar(0, 0, "loading")
             scene = whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
             sensor = sensor_of(scene, args.sensor, args.preview)
             spp = args.spp or preview_samples(sensor, args.preview)

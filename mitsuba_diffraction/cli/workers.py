@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import counted
 from ..system import cores
-from .console import say, say_warning
+from .console import Bar, say, say_warning
 from .options import Group, refuse, whole_number
 
 if TYPE_CHECKING:
@@ -72,10 +72,12 @@ def film_of(
     """Return the renderer of the command's frames on workers."""
     from ..cluster.frames import FrameSequence
 
-    film = FrameSequence(
-        client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
-        preview=args.preview, threads=worker_threads(args),
-    )  # fmt: skip
+    with Bar(args, delay=0) as bar:
+        bar(0, 0, "loading")
+        film = FrameSequence(
+            client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
+            preview=args.preview, threads=worker_threads(args),
+        )  # fmt: skip
     say_files(path for task in film.frames for path, _ in task.files.files)
     say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
     return film
