@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tokenize
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -87,7 +87,7 @@ def read_text(path: Path) -> RawHeights:
     Heights are in µm unless a header line says "Value units: nm"; "Width: 10 µm" and
     "Height: 10 µm" give the size of the patch. Empty cells and "nan" are points without data.
     Three columns are x, y and height, which have to form a regular grid; a line of names above
-    them may give their units, µm without. Separators and decimal commas are as in `columns`.
+    them may give their units, µm without, and another order. Separators and decimal commas are as in `columns`.
 
     Raises a DiffractionError if a cell is not a number, rows differ in length, or a unit is not a
     length.
@@ -114,12 +114,26 @@ def read_text(path: Path) -> RawHeights:
         )
     pixel_size: tuple[float, float] | None
     if points:
-        units = [_factor(u, shown) if u else 1.0 for u in table.units]
-        unit, stated = (units[2], table.units[2]) if table.units[2] else (unit, stated)
-        values, pixel_size = _from_points(values * [*units[:2], 1.0], shown)
+        order = _order_of(table.names)
+        x, y, height = (table.units[n] for n in order)
+        unit, stated = (_factor(height, shown), height) if height else (unit, stated)
+        units = [_factor(u, shown) if u else 1.0 for u in (x, y)]
+        values, pixel_size = _from_points(values[:, order] * [*units, 1.0], shown)
     else:
         pixel_size = (size[0] / nx, size[1] / ny) if size else None
     return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
+
+
+def _order_of(names: Sequence[str]) -> list[int]:
+    """Return the places of x, y and height among three columns: by their names, else as they are.
+
+    Names may end with a unit, as "x_nm".
+    """
+    axes = [re.split(r"[^a-z]", name.lower())[0] for name in names]
+    if axes.count("x") != 1 or axes.count("y") != 1:
+        return [0, 1, 2]
+    x, y = axes.index("x"), axes.index("y")
+    return [x, y, 3 - x - y]
 
 
 def _refuse_names(header: dict[int, str], shown: str) -> None:
@@ -175,8 +189,8 @@ def _from_points(
     heights (ny, nx), pixel size (dx, dy) in µm
     """
     uneven = DiffractionError(
-        f"{shown} has three columns, which are read as x, y and height, but its points do not "
-        "form a uniform grid; interpolate them to one first"
+        f"{shown} has three columns, which are read as x, y and height (a line of names may give "
+        "another order), but its points do not form a uniform grid; interpolate them to one first"
     )
     xs, ix = np.unique(points[:, 0], return_inverse=True)
     ys, iy = np.unique(points[:, 1], return_inverse=True)
