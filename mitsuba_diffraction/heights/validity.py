@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Real
 from ..errors import counted
+from .coherence import COLOURLESS
 from .field import LARGE, HeightField, blocks
 from .preprocess import MAD_TO_SIGMA, level_plane, level_quadratic, plane_of, plane_rise
 from .spectra import seen_slope
@@ -30,6 +31,7 @@ SMALLEST_RANGE = 1e-5
 IMPOSSIBLE_SLOPE = 10.0
 #: Words of the warnings that no command shortens.
 UNRELIABLE, AS_FACET = "do not rely on its colours", "taken for a facet"
+_IN_METRES = "less than an atom"
 #: Pixel size in µm beyond which the patch resolves at most a tenth of the directions at 380 nm.
 #: Scans have pixels of some nm to a few hundred.
 COARSEST_PIXEL = 2.0
@@ -115,7 +117,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     if 0 < field.range < SMALLEST_RANGE:
         lines.append(
             f"{field.name}: multiply the heights by 1e6 if they are in metres: they span only "
-            f"{field.range:.2g} µm, less than an atom"
+            f"{field.range:.2g} µm, {_IN_METRES}"
         )
     if field.cut_out:
         if tilted(field, shortest):
@@ -137,7 +139,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
 
 def stands_in_full(line: str) -> bool:
     """Return whether commands print a warning itself, beside the number of the others."""
-    return UNRELIABLE in line or AS_FACET in line
+    return any(part in line for part in (UNRELIABLE, AS_FACET, _IN_METRES, COLOURLESS))
 
 
 def _facet(field: HeightField, level: HeightField) -> bool:

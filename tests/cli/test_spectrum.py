@@ -81,6 +81,20 @@ def test_wavelengths_that_a_table_lacks_are_refused_if_they_were_asked_for(run, 
     assert not (world / "out.csv").exists()
 
 
+@pytest.mark.parametrize(
+    ("heights", "said"),
+    [(np.eye(8), "is narrower than two wavelengths and has no colours"),
+     (1e-6 * np.eye(64), "multiply the heights by 1e6 if they are in metres")],
+    ids=["eight pixels", "metres"],
+)  # fmt: skip
+def test_scans_without_colours_are_said_in_full(run, here, heights, said):
+    """Not as one of some notes that `info` prints."""
+    np.save(here / "a.npy", heights)
+    ran = run("spectrum", "a.npy", "--pixel-size", "0.05", "--step", "200")
+    assert ran.code == 0, ran.err
+    assert said in ran.err
+
+
 @pytest.mark.parametrize("command", ["spectrum", "survey"])
 def test_results_of_an_earlier_run_beside_the_scans_are_left_out(run, scans, monkeypatch, command):
     """As a shell names them for `spectrum *`, and in a folder."""

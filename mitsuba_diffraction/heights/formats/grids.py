@@ -87,7 +87,8 @@ def read_text(path: Path) -> RawHeights:
     Heights are in µm unless a header line says "Value units: nm"; "Width: 10 µm" and
     "Height: 10 µm" give the size of the patch. Empty cells and "nan" are points without data.
     Three columns are x, y and height, which have to form a regular grid; a line of names above
-    them may give their units, µm without, and another order. Separators and decimal commas are as in `columns`.
+    them may give their units, µm without, and another order. Separators and decimal commas are as
+    in `columns`.
 
     Raises a DiffractionError if a cell is not a number, rows differ in length, or a unit is not a
     length.
