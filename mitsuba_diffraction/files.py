@@ -71,6 +71,7 @@ _CONTENTS = (
     (b"\x89PNG\r\n\x1a\n", b"", FileKind.IMAGE),
     (b"\x93NUMPY", b"", FileKind.NPY),
     (b"\xff\xd8\xff", b"", FileKind.JPEG),
+    (b"PK\3\4", b"wavelengths.npy", FileKind.RESULT),  # `evaluate`
     *((f"{','.join(names)},".encode(), b"", FileKind.RESULT) for names in RESULTS),
 )
 _SUFFIXES = {

@@ -61,7 +61,8 @@ def test_plots_and_tables_that_the_program_writes_are_told_from_heights(tmp_path
     assert kind_of(tmp_path / "other.png") is FileKind.IMAGE
     save_rows(tmp_path / "survey.csv", ["file", "sample", "reason"], [])
     save_numbers(tmp_path / "spectrum.csv", ["wl", "light30"], np.ones((2, 2)), "%g")
-    for name in ("survey.csv", "spectrum.csv"):
+    np.savez_compressed(tmp_path / "evaluation.npz", wavelengths=np.ones(3), angles=np.ones(3))
+    for name in ("survey.csv", "spectrum.csv", "evaluation.npz"):
         assert kind_of(tmp_path / name) is FileKind.RESULT
         with pytest.raises(DiffractionError, match="is a plot or table of results, which has no"):
             HeightField.load(tmp_path / name, pixel_size=0.1)

@@ -226,7 +226,9 @@ def _aborted(field: HeightField) -> str:
 
 
 def _repeated(field: HeightField) -> str:
-    """Return a line on rows that repeat the one before."""
+    """Return a line on rows that repeat the one before, unless gaps were filled so."""
+    if any("method nearest" in line for line in field.history):
+        return ""
     repeats = _is_straight(np.diff(field.heights, axis=0)) & ~_is_straight(field.heights)[1:]
     count = int(repeats.sum())
     if not FEWEST <= count < 0.5 * len(repeats):
