@@ -31,7 +31,7 @@ SMALLEST_RANGE = 1e-5
 IMPOSSIBLE_SLOPE = 10.0
 #: Words of the warnings that no command shortens.
 UNRELIABLE, AS_FACET = "do not rely on its colours", "taken for a facet"
-_IN_METRES = "less than an atom"
+_IN_METRES, _IN_NM = "less than an atom", "in nm? Then divide"
 #: Pixel size in µm beyond which the patch resolves at most a tenth of the directions at 380 nm.
 #: Scans have pixels of some nm to a few hundred.
 COARSEST_PIXEL = 2.0
@@ -139,7 +139,8 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
 
 def stands_in_full(line: str) -> bool:
     """Return whether commands print a warning itself, beside the number of the others."""
-    return any(part in line for part in (UNRELIABLE, AS_FACET, _IN_METRES, COLOURLESS))
+    grave = UNRELIABLE, AS_FACET, _IN_METRES, _IN_NM, COLOURLESS
+    return any(part in line for part in grave)
 
 
 def _facet(field: HeightField, level: HeightField) -> bool:
@@ -192,11 +193,11 @@ def units_warning(field: HeightField) -> str:
     """Return a warning that lengths look like nanometres read as µm, or "" if plausible."""
     coarse = max(field.pixel_size)
     if coarse > COARSEST_PIXEL:
-        return f"is the pixel size of {coarse:.4g} µm in nm? Then divide it by 1000"
+        return f"is the pixel size of {coarse:.4g} µm {_IN_NM} it by 1000"
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         return (
-            f"are the heights, with a range of {field.range:.4g} µm, in nm? Then divide them (of "
-            "an image: max_height) by 1000"
+            f"are the heights, with a range of {field.range:.4g} µm, {_IN_NM} them (of an image: "
+            "max_height) by 1000"
         )
     return ""
 

@@ -212,6 +212,8 @@ REFUSED = {
     "render": {
         "none.xml": "none.xml",
         "empty": "is a folder",
+        "grating.npy": "'grating.npy' (array) is neither a scene (XML) nor a mesh",
+        "recipe.toml": "'recipe.toml' (recipe) is neither a scene (XML) nor a mesh",
         "room.xml --plan no.toml -o a.exr": "no.toml' does not exist",
     },
 }

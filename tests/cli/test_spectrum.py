@@ -82,15 +82,16 @@ def test_wavelengths_that_a_table_lacks_are_refused_if_they_were_asked_for(run, 
 
 
 @pytest.mark.parametrize(
-    ("heights", "said"),
-    [(np.eye(8), "is narrower than two wavelengths and has no colours"),
-     (1e-6 * np.eye(64), "multiply the heights by 1e6 if they are in metres")],
-    ids=["eight pixels", "metres"],
+    ("heights", "pixel", "said"),
+    [(np.eye(8), 0.05, "is narrower than two wavelengths and has no colours"),
+     (1e-6 * np.eye(64), 0.05, "multiply the heights by 1e6 if they are in metres"),
+     (0.1 * np.eye(16), 50, "is the pixel size of 50 µm in nm?")],
+    ids=["eight pixels", "metres", "nanometres"],
 )  # fmt: skip
-def test_scans_without_colours_are_said_in_full(run, here, heights, said):
+def test_scans_without_colours_and_in_other_units_are_said_in_full(run, here, heights, pixel, said):
     """Not as one of some notes that `info` prints."""
     np.save(here / "a.npy", heights)
-    ran = run("spectrum", "a.npy", "--pixel-size", "0.05", "--step", "200")
+    ran = run("spectrum", "a.npy", "--pixel-size", pixel, "--step", "200")
     assert ran.code == 0, ran.err
     assert said in ran.err
 
