@@ -174,10 +174,19 @@ def _run(args: argparse.Namespace) -> int:
         where = f" '{error.filename}'" if error.filename else ""
         return _fail(error, f"{error.strerror or error}{where}", args.debug)
     except Exception as error:
+        if _interrupted(error):
+            say_interrupted()
+            return INTERRUPTED
         text = f"unexpected {type(error).__name__}: {error}"
         if not args.debug:
             text += "; run it again with --debug for the traceback, and please report it"
         return _fail(error, text, args.debug)
+
+
+def _interrupted(error: Exception) -> bool:
+    """Say whether Ctrl-C is the cause: the import of an extension that it ends is a SystemError."""
+    cause = error.__cause__ or error.__context__
+    return isinstance(error, SystemError) and isinstance(cause, KeyboardInterrupt)
 
 
 def _load_matplotlib() -> None:
