@@ -184,9 +184,11 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _interrupted(error: Exception) -> bool:
-    """Say whether Ctrl-C is the cause: the import of an extension that it ends is a SystemError."""
-    cause = error.__cause__ or error.__context__
-    return isinstance(error, SystemError) and isinstance(cause, KeyboardInterrupt)
+    """Say whether Ctrl-C is the cause: extensions that it ends while they load raise own errors."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None
 
 
 def _load_matplotlib() -> None:

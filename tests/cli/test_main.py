@@ -135,16 +135,17 @@ def test_ctrl_c_exits_with_130(run, command):
     ]
 
 
-def test_ctrl_c_within_the_import_of_an_extension_exits_with_130(run, command):
-    """Python makes a SystemError of it, "returned a result with an exception set"."""
+@pytest.mark.parametrize("kind", [SystemError, ImportError])
+def test_ctrl_c_within_the_import_of_an_extension_exits_with_130(run, command, kind):
+    """Python and nanobind make errors of their own of it."""
 
     def action():
-        raise SystemError("a result with an exception set") from KeyboardInterrupt()
+        raise kind("Encountered an error while initializing") from KeyboardInterrupt()
 
     ran = run(*command(action))
     assert ran.code == 130
     assert "unexpected" not in ran.err
-    assert "unexpected SystemError" in run(*command(raising(SystemError("own")))).err
+    assert f"unexpected {kind.__name__}" in run(*command(raising(kind("own")))).err
 
 
 def test_a_warning_is_one_line_and_said_once(run, command):
