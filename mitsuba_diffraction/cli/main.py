@@ -100,6 +100,10 @@ def _main(argv: Sequence[str] | None) -> int:
         return FAILED
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
+    except KeyboardInterrupt:
+        with ended_at_once():
+            say_interrupted()
+        return INTERRUPTED
     with own_program(), warnings_in_one_line(), ended_at_once(), noted():
         return _run(args)
 

@@ -135,6 +135,14 @@ def test_ctrl_c_exits_with_130(run, command):
     ]
 
 
+def test_ctrl_c_while_options_are_parsed_exits_with_130(run, monkeypatch):
+    monkeypatch.setattr("mitsuba_diffraction.cli.main.build_parser", raising(KeyboardInterrupt()))
+    ran = run("info", "x")
+    assert ran.code == 130
+    assert ran.err.startswith("mitsuba-diffraction: interrupted; ")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
 @pytest.mark.parametrize("kind", [SystemError, ImportError])
 def test_ctrl_c_within_the_import_of_an_extension_exits_with_130(run, command, kind):
     """Python and nanobind make errors of their own of it."""
