@@ -136,7 +136,8 @@ def test_ctrl_c_exits_with_130(run, command):
 
 
 def test_ctrl_c_while_options_are_parsed_exits_with_130(run, monkeypatch):
-    monkeypatch.setattr("mitsuba_diffraction.cli.main.build_parser", raising(KeyboardInterrupt()))
+    module = sys.modules["mitsuba_diffraction.cli.main"]  # the room has a function of this name
+    monkeypatch.setattr(module, "build_parser", raising(KeyboardInterrupt()))
     ran = run("info", "x")
     assert ran.code == 130
     assert ran.err.startswith("mitsuba-diffraction: interrupted; ")
