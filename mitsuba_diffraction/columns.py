@@ -118,6 +118,17 @@ class Columns(NamedTuple):
                 )
         return self.numbers[:, list(columns)]
 
+    def order(self, axes: str) -> list[int]:
+        """Return the places of columns named by letters, then of the others.
+
+        Names may end with a unit, as "x_nm". Without a column of each letter the order stays.
+        """
+        letters = [re.split(r"[^a-z]", name.lower())[0] for name in self.names]
+        if any(letters.count(axis) != 1 for axis in axes):
+            return list(range(len(letters)))
+        named = [letters.index(axis) for axis in axes]
+        return named + [n for n in range(len(letters)) if n not in named]
+
     def column(self, name: str) -> int:
         """Return the number of the column of values with a name, or of the only one without.
 

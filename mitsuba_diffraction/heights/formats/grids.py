@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tokenize
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -115,7 +115,7 @@ def read_text(path: Path) -> RawHeights:
         )
     pixel_size: tuple[float, float] | None
     if points:
-        order = _order_of(table.names)
+        order = table.order("xy")
         x, y, height = (table.units[n] for n in order)
         unit, stated = (_factor(height, shown), height) if height else (unit, stated)
         units = [_factor(u, shown) if u else 1.0 for u in (x, y)]
@@ -123,18 +123,6 @@ def read_text(path: Path) -> RawHeights:
     else:
         pixel_size = (size[0] / nx, size[1] / ny) if size else None
     return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
-
-
-def _order_of(names: Sequence[str]) -> list[int]:
-    """Return the places of x, y and height among three columns: by their names, else as they are.
-
-    Names may end with a unit, as "x_nm".
-    """
-    axes = [re.split(r"[^a-z]", name.lower())[0] for name in names]
-    if axes.count("x") != 1 or axes.count("y") != 1:
-        return [0, 1, 2]
-    x, y = axes.index("x"), axes.index("y")
-    return [x, y, 3 - x - y]
 
 
 def _refuse_names(header: dict[int, str], shown: str) -> None:

@@ -205,7 +205,7 @@ GENERATORS: dict[str, Callable[..., Profile]] = {
 
 
 def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
-    """Read a line: two columns x and z in µm, or in the units that a header line names.
+    """Read a line: two columns x and z in µm, or in the units and order that a header line names.
 
     Raises a DiffractionError if the file cannot be read, a line has no two numbers, or the line is
     no `Profile`, or less than half a period.
@@ -228,7 +228,8 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     if None in factors:
         unit = table.units[factors.index(None)]
         raise DiffractionError(f"'{path}': {quoted(unit)} is not a unit of length; expected µm, nm")
-    x, z = (table.finite((0, 1), what) * np.array(factors, np.float64)).T
+    lengths = table.finite((0, 1), what) * np.array(factors, np.float64)
+    x, z = lengths[:, table.order("x")].T
     x = x - x.min()
     if len(x) > 2 and x.max() < 0.5 * period:
         raise DiffractionError(
