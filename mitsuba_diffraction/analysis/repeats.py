@@ -51,7 +51,8 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
             held = [f for f in shown if f.suffix.lower() not in _NO_SCANS]
             if not held:
                 raise DiffractionError(f"'{name}' holds no scans; name another folder")
-            note_folder(name)
+            if not all(kind_of(file) is FileKind.RESULT for file in held):
+                note_folder(name)  # else that of an earlier survey, which this one may go on
         elif not name.exists() and glob.has_magic(str(name)):
             held = [Path(f) for f in sorted(glob.glob(str(name), recursive=True))]
             held = [f for f in held if f.is_file()]

@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> Figures:
         )
     whole = sum("crop" not in row for row in rows if not row["reason"])
     if args.crops is not None and whole:
-        say(f"{whole} of the scans have no crops of {WINDOW:g} µm and are measured as a whole")
+        say(f"measured as a whole, without crops of {WINDOW:g} µm: {counted(whole, 'scan')}")
     done, samples = len(rows) - failed, len({row["sample"] for row in rows})
     measured = counted(done, "scan")
     if args.crops is not None:
