@@ -20,6 +20,12 @@ from tests.support.patches import DEEP, DEFAULTS, PATCH
 pytestmark = pytest.mark.thorough
 
 
+@pytest.mark.parametrize("heights", ["scan.npy", [[0.0, 1.0]], 3.0])
+def test_what_is_no_height_field_is_refused(heights):
+    with pytest.raises(DiffractionError, match=r"HeightField\.load reads a file"):
+        DiffractionTable.build(heights)
+
+
 def refused(**arguments):
     """The one line with which a table of PATCH, or of heights=…, is refused."""
     heights = arguments.pop("heights", PATCH)
