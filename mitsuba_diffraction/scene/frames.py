@@ -82,6 +82,7 @@ def check_frames(scene: Path, frames: Sequence[Frame]) -> None:
             else:
                 check_values(scene, frame.values)
         except DiffractionError as error:
+            load_scene(scene, frames[0].values)  # its own error, if it is that of all frames
             raise DiffractionError(f"{frame.png.stem}: {error}") from error
 
 

@@ -357,6 +357,11 @@ def _check_films(state: Any) -> None:
         )
         if not isinstance(width, int) or not isinstance(height, int):
             continue  # Mitsuba names the type that it expects
+        if width * height == 0:
+            raise DiffractionError(
+                f"a picture of {width} x {height} pixels has none; give a width and a height of at "
+                "least 1 (resx, resy of most scenes)"
+            )
         needed = width * height * _BYTES_PER_PIXEL
         if needed > memory():
             raise DiffractionError(

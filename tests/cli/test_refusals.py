@@ -163,7 +163,10 @@ REFUSED = {
         command: {"groove.toml": "run the command 'solve groove.toml'"}
         for command in ("precompute ", "info ", "brdf-map ", "evaluate ", "spectrum ")
     },
-    "plan scale.xml": {"-D widht=3": "did you mean width?"},
+    "plan scale.xml": {
+        "-D widht=3": "did you mean width?",
+        "-D width=0": "a picture of 0 x 4 pixels has none",
+    },
     "hologram": {
         "red.png": "no colour beside its ground",
         "none.png": "'none.png' does not exist",
@@ -206,6 +209,7 @@ REFUSED = {
         "--observer dog --illuminant leafs -m scalar_spectral": "did you mean leaves?)",
     },
     _FRAMES: {
+        "--turn nowhere": "error: 'room.xml' has no parameter 'nowhere'; it has",
         "--turn format": "the turn of format begins at 'rgb', which is not an angle",
         "--animate ssp=0:1": "did you mean spp?",
     },
