@@ -97,7 +97,7 @@ def _values(args: argparse.Namespace) -> list[Any] | None:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
         text = " ".join(args.values)
-        raise DiffractionError(f"--values: expected numbers, got '{text}'") from error
+        raise DiffractionError(f"--values: expected numbers, blanks between, got '{text}'") from error
 
 
 def _compiled(

@@ -99,7 +99,7 @@ REFUSED = {
     },
     f"sweep terms {_SWEEP}": {
         "--coherence-width 1e300": "coherence_width",
-        "--values a": "--values: expected numbers, got 'a'",
+        "--values a": "--values: expected numbers, blanks between, got 'a'",
         "--method nmm": "needs method 'flss'",
     },
     f"sweep light-angle {_SWEEP}": {"--values 95": "theta=95 must be"},
