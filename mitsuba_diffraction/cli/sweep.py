@@ -97,7 +97,8 @@ def _values(args: argparse.Namespace) -> list[Any] | None:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
         text = " ".join(args.values)
-        raise DiffractionError(f"--values: expected numbers, blanks between, got '{text}'") from error
+        line = f"--values: expected numbers, blanks between, got '{text}'"
+        raise DiffractionError(line) from error
 
 
 def _compiled(
