@@ -51,6 +51,9 @@ def open_image(
         raise UnidentifiedImageError(f"its format is none of {', '.join(formats)}") from error
     except Image.DecompressionBombError as error:
         raise DiffractionError(f"{name} is too large: {error}") from error
+    if image.format == "TIFF":
+        # Pillow 13 would map it into memory, with the sides that it has after its tag turned it
+        image.filename = ""
     if isinstance(file, str | os.PathLike):
         try:
             check_content(8.0 * image.width * image.height, os.path.getsize(file), name)
