@@ -27,7 +27,8 @@ _SIZE, _PAGE, _BEFORE = 1 << 16, 4096, b"what was there before"
 def writers(scratch: Path) -> dict[str, Callable[[Path], None]]:
     """Return functions that write small files by name; frames of films lie in `scratch`."""
     from mitsuba_diffraction.analysis.export.rgl import DEFAULT, save_rgl
-    from mitsuba_diffraction.cli.report import save_figure, save_json
+    from mitsuba_diffraction.cli.report import save_json
+    from mitsuba_diffraction.images import save_figure
     from mitsuba_diffraction.scene.frames import FILMS, write_film
     from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
     from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
