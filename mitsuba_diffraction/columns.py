@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Real
 from .atomic import atomic_path
-from .errors import DiffractionError, printable, quoted
+from .errors import DiffractionError, counted, printable, quoted
 from .files import readable_file
 from .limits import LARGEST_LISTING, bounded_lines
 
@@ -117,6 +117,17 @@ class Columns(NamedTuple):
                     f"expected {what}"
                 )
         return self.numbers[:, list(columns)]
+
+    def order(self, axes: str) -> list[int]:
+        """Return the places of columns named by letters, then of the others.
+
+        Names may end with a unit, as "x_nm". Without a column of each letter the order stays.
+        """
+        letters = [re.split(r"[^a-z]", name.lower())[0] for name in self.names]
+        if any(letters.count(axis) != 1 for axis in axes):
+            return list(range(len(letters)))
+        named = [letters.index(axis) for axis in axes]
+        return named + [n for n in range(len(letters)) if n not in named]
 
     def column(self, name: str) -> int:
         """Return the number of the column of values with a name, or of the only one without.
@@ -201,7 +212,7 @@ def parse_columns(lines: Iterable[str], shown: str) -> Columns:
         cells = split(row_text)
         if rows and len(cells) != len(rows[0]):
             raise DiffractionError(
-                f"{shown}, line {place}: {len(cells)} numbers where the first row has "
+                f"{shown}, line {place}: {counted(len(cells), 'number')} where the first row has "
                 f"{len(rows[0])}"
             )
         row, strange = _row(cells)

@@ -93,6 +93,11 @@ def quoted(value: object) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Return a number and what it counts, "1 scan" or "3 scans"; the noun is in the singular."""
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
+
+
 def check_choice(name: str, value: object, choices: Iterable[str]) -> None:
     """Raise a DiffractionError if the value of a parameter is not one of `choices`."""
     if value not in (known := tuple(choices)):

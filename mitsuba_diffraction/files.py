@@ -27,6 +27,14 @@ from .limits import LARGEST_FILE, LARGEST_TEXT, MOST_KEY_PARTS
 TABLE_ATTRIBUTE = "mitsuba_diffraction"
 #: Attribute that tells tables of orders from other NetCDF files.
 ORDERS_ATTRIBUTE = "mitsuba_diffraction_orders"
+#: Name of this program in a plot.
+SOFTWARE = "mitsuba-diffraction"
+#: First columns of the CSV files that this program writes; theirs is no comment to tell them by.
+RESULTS = (
+    ("wl",), ("spectrum",), ("group", "scan"), ("patch1", "patch2"), ("file", "sample"),
+    ("sample", "scans"), ("frequency_per_um",), ("wavelength_nm", "ridge_deg"),
+    ("value", "seconds"), ("theta_i_deg", "phi_i_deg"),
+)  # fmt: skip
 #: Suffixes of glTF and USD, which optional packages read.
 GLTF, USD = (".glb", ".gltf"), (".usd", ".usda", ".usdc", ".usdz")
 #: Suffixes of mesh files; the first three are read by Mitsuba.
@@ -36,7 +44,7 @@ OTHER_MESHES = (".stl", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
 
 
 class FileKind(StrEnum):
-    """Kind of a file; all but the first five are heights, named by their reader."""
+    """Kind of a file; all but the first five and the last are heights, named by their reader."""
 
     TABLE = "table"
     ORDERS = "table of orders"
@@ -49,6 +57,7 @@ class FileKind(StrEnum):
     TEXT = "text"
     JPEG = "JPEG"
     INSTRUMENT = "instrument file"
+    RESULT = "plot or table of results"
 
 
 # First bytes, a text among the bytes at the beginning, and the kind of the file; attributes of EXR
@@ -58,9 +67,12 @@ _CONTENTS = (
     (b"\x76\x2f\x31\x01", f"\0{TABLE_ATTRIBUTE}\0string\0".encode(), FileKind.TABLE),
     (b"\x76\x2f\x31\x01", b"", FileKind.EXR),
     (b"CDF", ORDERS_ATTRIBUTE.encode(), FileKind.ORDERS),
+    (b"\x89PNG\r\n\x1a\n", f"Software\0{SOFTWARE}".encode(), FileKind.RESULT),
     (b"\x89PNG\r\n\x1a\n", b"", FileKind.IMAGE),
     (b"\x93NUMPY", b"", FileKind.NPY),
     (b"\xff\xd8\xff", b"", FileKind.JPEG),
+    (b"PK\3\4", b"wavelengths.npy", FileKind.RESULT),  # `evaluate`
+    *((f"{','.join(names)},".encode(), b"", FileKind.RESULT) for names in RESULTS),
 )
 _SUFFIXES = {
     ".toml": FileKind.RECIPE, ".xml": FileKind.SCENE, ".exr": FileKind.EXR, ".npy": FileKind.NPY,

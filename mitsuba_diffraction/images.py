@@ -9,13 +9,17 @@ import contextlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING, Any
 
 from PIL import EpsImagePlugin, Image, UnidentifiedImageError
 
+from .atomic import atomic_path
 from .errors import DiffractionError, one_line
-from .files import readable_file
+from .files import SOFTWARE, readable_file
 from .limits import check_content
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Formats of images, in Pillow's names; the content decides, not the suffix.
 FORMATS = ("PNG", "JPEG", "BMP", "DIB", "GIF", "TIFF", "WEBP")
@@ -47,6 +51,9 @@ def open_image(
         raise UnidentifiedImageError(f"its format is none of {', '.join(formats)}") from error
     except Image.DecompressionBombError as error:
         raise DiffractionError(f"{name} is too large: {error}") from error
+    if image.format == "TIFF":
+        # Pillow 13 would map it into memory, with the sides that it has after its tag turned it
+        image.filename = ""
     if isinstance(file, str | os.PathLike):
         try:
             check_content(8.0 * image.width * image.height, os.path.getsize(file), name)
@@ -68,3 +75,16 @@ def read_picture(path: Path) -> Image.Image:
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         reason = one_line(str(error))
         raise DiffractionError(f"'{path}' cannot be read as a picture: {reason}") from error
+
+
+def save_figure(path: Path, figure: Figure, **how: Any) -> None:
+    """Write a figure in the format of the suffix; `files.kind_of` tells a PNG from scans.
+
+    how : more arguments of `matplotlib.figure.Figure.savefig`.
+
+    Raises a DiffractionError if the file cannot be written.
+    """
+    name = path.suffix[1:].lower()
+    metadata = {"Software": SOFTWARE} if name == "png" else None
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format=name, metadata=metadata, **how)

@@ -14,7 +14,7 @@ import numpy as np
 
 from .arrays import Real
 from .columns import WAVELENGTH_UNITS, Columns, read_columns
-from .errors import DiffractionError, warn
+from .errors import DiffractionError, counted, warn
 
 #: Suffixes of spectra: text, and what software of spectrometers names its text.
 SPECTRA = (
@@ -82,8 +82,8 @@ def read_spectra(
         if every:
             raise DiffractionError(f"{table.shown}, line {line}: expected numbers: {wanted}")
         warn(
-            f"{table.shown}: {np.sum(~complete)} lines without a number are left out, the first "
-            f"is line {line}"
+            f"{table.shown}: {counted(int(np.sum(~complete)), 'line')} without a number left "
+            f"out, the first is line {line}"
         )
     numbers, lines = numbers[complete], table.lines[complete]
     order = np.argsort(numbers[:, 0])

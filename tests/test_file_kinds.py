@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
+from mitsuba_diffraction.columns import save_numbers, save_rows
 from mitsuba_diffraction.files import FileKind, kind_of
+from mitsuba_diffraction.images import save_figure
 from tests.support.orders import thin_grating
 from tests.support.patches import DEFAULTS, PATCH
 
@@ -48,6 +50,22 @@ def test_content_decides_before_the_suffix(tmp_path, content, kind):
     file = tmp_path / "a.jpk"
     file.write_bytes(content)
     assert kind_of(file) is kind
+
+
+def test_plots_and_tables_that_the_program_writes_are_told_from_heights(tmp_path):
+    from matplotlib.figure import Figure
+
+    save_figure(tmp_path / "own.png", Figure())
+    Figure().savefig(tmp_path / "other.png")  # as pyplot.imsave, which may hold heights
+    assert kind_of(tmp_path / "own.png") is FileKind.RESULT
+    assert kind_of(tmp_path / "other.png") is FileKind.IMAGE
+    save_rows(tmp_path / "survey.csv", ["file", "sample", "reason"], [])
+    save_numbers(tmp_path / "spectrum.csv", ["wl", "light30"], np.ones((2, 2)), "%g")
+    np.savez_compressed(tmp_path / "evaluation.npz", wavelengths=np.ones(3), angles=np.ones(3))
+    for name in ("survey.csv", "spectrum.csv", "evaluation.npz"):
+        assert kind_of(tmp_path / name) is FileKind.RESULT
+        with pytest.raises(DiffractionError, match="is a plot or table of results, which has no"):
+            HeightField.load(tmp_path / name, pixel_size=0.1)
 
 
 def test_tables_are_told_from_pictures_and_other_netcdf(tmp_path):

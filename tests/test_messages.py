@@ -14,7 +14,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning, printable, warn
+from mitsuba_diffraction.errors import (
+    DiffractionError,
+    DiffractionWarning,
+    counted,
+    printable,
+    warn,
+)
 from tests.support import ROOT
 from tests.support.docstrings import PACKAGE
 
@@ -23,6 +29,11 @@ def test_what_lies_between_two_quotations_is_not_cut():
     prose = "in a sentence of many words that says what is wrong and where, " * 4
     text = f"'a file.png' is {prose}so give crop='1' or 'none'"
     assert str(DiffractionError(text)) == text
+
+
+def test_a_count_of_one_has_its_noun_in_the_singular():
+    assert counted(1, "scan") == "1 scan"
+    assert [counted(n, "spectrum", "spectra") for n in (0, 2)] == ["0 spectra", "2 spectra"]
 
 
 def test_a_long_quotation_is_cut_in_its_middle():

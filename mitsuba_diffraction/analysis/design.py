@@ -25,9 +25,8 @@ from scipy import fft, ndimage, optimize
 
 from .. import reference
 from ..arrays import Real
-from ..errors import DiffractionError
-from ..heights import HeightField
-from ..heights.field import check_pixel_count
+from ..errors import DiffractionError, counted
+from ..heights.field import HeightField, check_pixel_count
 from ..heights.lengths import PixelSize
 from ..optics import colour
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
@@ -188,7 +187,8 @@ def recover(
         return float(scale * difference @ difference), scale * difference / amplitude
 
     heights, steps = _minimise(views, amplitudes, start.heights, smoothing, None, iterations)
-    return start.changed(heights, f"recovered from {len(views)} views in {steps} steps")
+    done = f"from {counted(len(views), 'view')} in {counted(steps, 'step')}"
+    return start.changed(heights, f"recovered {done}")
 
 
 def _minimise(
@@ -314,7 +314,7 @@ def relief(
     start = max_height * (noise - noise.min()) / max(np.ptp(noise), 1e-30)
     bounds = optimize.Bounds(0.0, max_height)
     heights, steps = _minimise(views, squared_difference, start, smoothing, bounds, iterations)
-    return patch.changed(heights, f"designed for {m} colours in {steps} steps")
+    return patch.changed(heights, f"designed for {m} colours in {counted(steps, 'step')}")
 
 
 def shown(

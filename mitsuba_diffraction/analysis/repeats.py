@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..columns import save_rows
-from ..errors import DiffractionError
+from ..errors import DiffractionError, warn
+from ..files import FileKind, kind_of
 from ..inputs import note_folder
 from ..scene.parameters import note_files
 from .iridescence import HUES
@@ -38,9 +39,10 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
     """List scans: files as they are named, files of folders, and files that match patterns.
 
     Folders are not searched deeper; hidden files, and files of documents, are left out of them.
+    Plots and tables that this program wrote beside the scans are left out with a warning.
 
-    Raises a DiffractionError if a folder holds no file, no file matches a pattern, or no file
-    exists. One that is missing among others is listed: its reader says so.
+    Raises a DiffractionError if a folder holds no file, no file matches a pattern, no file exists,
+    or all are such results. One that is missing among others is listed: its reader says so.
     """
     files: dict[Path, None] = {}
     for name in names:
@@ -49,7 +51,8 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
             held = [f for f in shown if f.suffix.lower() not in _NO_SCANS]
             if not held:
                 raise DiffractionError(f"'{name}' holds no scans; name another folder")
-            note_folder(name)
+            if not all(kind_of(file) is FileKind.RESULT for file in held):
+                note_folder(name)  # else that of an earlier survey, which this one may go on
         elif not name.exists() and glob.has_magic(str(name)):
             held = [Path(f) for f in sorted(glob.glob(str(name), recursive=True))]
             held = [f for f in held if f.is_file()]
@@ -60,9 +63,15 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
         files |= dict.fromkeys(held)
     if files and not any(file.exists() for file in files):
         raise DiffractionError(f"'{next(iter(files))}' does not exist; check the path")
-    for file in files:
+    results = [file for file in files if kind_of(file) is FileKind.RESULT]
+    if results and len(results) == len(files):
+        raise DiffractionError(f"'{results[0]}' is a {FileKind.RESULT}, and no scan; name scans")
+    if results:
+        warn(f"left out, each a {FileKind.RESULT}: {', '.join(map(str, results))}")
+    scans = [file for file in files if file not in results]
+    for file in scans:
         note_files(file)
-    return list(files)
+    return scans
 
 
 def sample_of(file: Path, repeats: str = "name") -> str:

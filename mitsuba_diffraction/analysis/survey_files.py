@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
-from ..atomic import atomic_path
 from ..columns import save_rows
+from ..images import save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,9 +72,8 @@ def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     measured = [row for row in rows if not row["reason"]]
     for page in range(math.ceil(len(measured) / per_page)):
         name = SHEET if len(measured) <= per_page else f"{SHEET}-{page + 1:03d}"
-        with atomic_path(folder / f"{name}.png") as temporary:
-            sheet = _sheet(folder, measured[page * per_page : (page + 1) * per_page])
-            sheet.savefig(temporary, format="png")
+        sheet = _sheet(folder, measured[page * per_page : (page + 1) * per_page])
+        save_figure(folder / f"{name}.png", sheet)
 
 
 def _iridescence(row: Mapping[str, Any]) -> str:

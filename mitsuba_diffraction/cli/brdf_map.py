@@ -8,7 +8,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, DiffractionWarning, counted
 from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
@@ -179,7 +179,7 @@ def run(args: argparse.Namespace) -> Figures:
     seconds = elapsed(args)
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
-        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {method}"
+        f"{counted(result.samples, 'sample')} per pixel, {bands}{shown}, {seconds:.1f} s, {method}"
     )
     return {"source": args.source, "files": written, "theta": args.theta,
             "phi": args.phi, "pixels": args.resolution, "samples": result.samples,

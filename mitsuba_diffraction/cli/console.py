@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from typing import Any, Self
 
 from ..errors import DiffractionWarning, one_line, shortened
+from ..progress import showing
 
 PROGRAM = "mitsuba-diffraction"
 
@@ -122,6 +123,7 @@ class Bar:
         self._bar: Any = None
         self._in_lines = args.progress is None and not self._wanted
         self._state, self._over = "working", threading.Event()
+        self._loading = showing(self._show_loading)
 
     def __call__(self, done: int, total: int, text: str) -> None:
         """Show `done` of `total`; both may start again for a second stage.
@@ -136,6 +138,15 @@ class Bar:
             self._start(total, text)
         self._bar.set_description(text, refresh=False)
         self._bar.update(done - self._bar.n)
+
+    def _show_loading(self, done: int, total: int, text: str) -> None:
+        """Show what a BSDF does while it loads; the count of an animation's frames stays."""
+        text = f"{text}, {done} of {total}" if total > 1 else text
+        if self._bar is None or not self._bar.total:
+            self(0, 0, text)
+        else:
+            self._state = text
+            self._bar.set_description(text)
 
     def _say_regularly(self) -> None:
         """Say how far the work is, until it ends."""
@@ -162,9 +173,11 @@ class Bar:
     def __enter__(self) -> Self:
         if self._in_lines:
             threading.Thread(target=self._say_regularly, daemon=True).start()
+        self._loading.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._loading.__exit__(None, None, None)
         self._over.set()
         if self._bar is not None:
             self._bar.close()

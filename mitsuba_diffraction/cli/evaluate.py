@@ -11,13 +11,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, DiffractionWarning, counted
+from ..images import save_figure
 from ..settings import TableSettings
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import whole_number
-from .report import Figures, beside, elapsed, output_of, save_figure
+from .report import Figures, beside, elapsed, output_of
 
 if TYPE_CHECKING:
     from ..heights import HeightField
@@ -86,7 +87,8 @@ def run(args: argparse.Namespace) -> Figures:
     _write(args, experiment, result, report, written)
     print(
         f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
-        f"{experiment.beam}, {experiment.steps.size} wavelengths, {experiment.angles.size} angles, "
+        f"{experiment.beam}, {counted(experiment.steps.size, 'wavelength')}, "
+        f"{counted(experiment.angles.size, 'angle')}, "
         f"{elapsed(args):.1f} s"
     )
     if distance := _distance(args, result.ridge):

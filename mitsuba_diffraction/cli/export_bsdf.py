@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> Figures:
     size = output.stat().st_size
     print(
         f"{args.source} -> {output}: {name}, {size / 1e6:.1f} MB, {grid.theta.size} x "
-        f"{grid.phi.size} directions of light, {grid.wavelengths.size} wavelengths, "
+        f"{grid.phi.size} directions of light, {counted(grid.wavelengths.size, 'wavelength')}, "
         f"{elapsed(args):.1f} s"
     )
     return {"source": args.source, "file": output, "format": name, "bytes": size,

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..files import GLTF, MESHES, FileKind
+from ..images import save_figure
 from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
 from .options import path_ending_in
-from .report import STDOUT, Figures, lines_of, plain, save_figure
+from .report import STDOUT, Figures, lines_of, plain
 
 if TYPE_CHECKING:
     from ..heights import HeightField, Recipe, Source

@@ -21,6 +21,9 @@ INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 TERMINATED = 143  # 128 + SIGTERM
 _CODES = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
 
+_NOTHING = "no half-written file was left behind"
+_kept = _NOTHING  # of the running command, of which a process has one
+
 #: Seconds in which the main thread may unwind by itself.
 GRACE = 1.0
 
@@ -31,11 +34,13 @@ def ended_at_once() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers
         return
+    keep_in_mind(_NOTHING)
     reader, writer = socket.socketpair()
     writer.setblocking(False)
     left = threading.Event()
     watcher = threading.Thread(target=_watch, args=(reader, left), daemon=True)
     terminate = signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
+    interrupt = signal.getsignal(signal.SIGINT)
     wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
     watcher.start()
     try:
@@ -47,11 +52,20 @@ def ended_at_once() -> Iterator[None]:
         writer.close()
         watcher.join()
         reader.close()
+        signal.signal(signal.SIGINT, interrupt)
+
+
+def keep_in_mind(kept: str) -> None:
+    """Set the text on finished work with which an interruption ends this command, at any time."""
+    global _kept
+    _kept = kept
 
 
 def say_interrupted() -> None:
-    """Print the last line of an interrupted command."""
-    say("interrupted; no half-written file was left behind")
+    """Print the last line of an interrupted command, which another Ctrl-C does not cut short."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # `ended_at_once` restores it
+    say(f"interrupted; {_kept}")
 
 
 def _watch(reader: socket.socket, left: threading.Event) -> None:

@@ -100,6 +100,10 @@ def _main(argv: Sequence[str] | None) -> int:
         return FAILED
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
+    except KeyboardInterrupt:
+        with ended_at_once():
+            say_interrupted()
+        return INTERRUPTED
     with own_program(), warnings_in_one_line(), ended_at_once(), noted():
         return _run(args)
 
@@ -174,10 +178,21 @@ def _run(args: argparse.Namespace) -> int:
         where = f" '{error.filename}'" if error.filename else ""
         return _fail(error, f"{error.strerror or error}{where}", args.debug)
     except Exception as error:
+        if _interrupted(error):
+            say_interrupted()
+            return INTERRUPTED
         text = f"unexpected {type(error).__name__}: {error}"
         if not args.debug:
             text += "; run it again with --debug for the traceback, and please report it"
         return _fail(error, text, args.debug)
+
+
+def _interrupted(error: Exception) -> bool:
+    """Say whether Ctrl-C is the cause: extensions that it ends while they load raise own errors."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, KeyboardInterrupt):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None
 
 
 def _load_matplotlib() -> None:

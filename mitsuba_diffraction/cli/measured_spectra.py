@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import functools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..files import FileKind
 from ..settings import TableSettings
 from . import options
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
     from ..analysis.spectrometer import MeasurementGeometry
     from ..analysis.treatments import Treatment
-    from ..orders import OrderTable
-    from ..tables import TableSource
+    from ..tables.source import TableSource
 
 
 @dataclass
@@ -64,7 +64,7 @@ class Measurement:
     def say_notes(self) -> None:
         """Print the number of scans with notes, beside the notes of the first scan."""
         if self._noted > 1:
-            others = "1 more scan" if self._noted == 2 else f"{self._noted - 1} more scans"
+            others = counted(self._noted - 1, "more scan")
             say(f"notes on {others}: 'mitsuba-diffraction info' prints them")
 
     def _treatment(self, file: Path) -> Treatment:
@@ -78,7 +78,7 @@ class Measurement:
         """Measure the spectra of a table."""
         from ..tables import DiffractionTable
 
-        args, lam = self.args, self.lam
+        args = self.args
         own = (*options.HEIGHTS, *options.TABLE, "crops", "ext_ior")
         if refused := options.given(args, own):
             option = options.option_of(args, next(iter(refused)))
@@ -90,11 +90,28 @@ class Measurement:
                 f"'{file}' is a table, without heights to find gratings in; give --azimuth in "
                 "degrees"
             )
-        if not isinstance(table, DiffractionTable):
-            lam = _within(table, lam, file)
-        elif args.wavelength_range is None:
-            lam = lam[lam >= table.wavelength_range[0]]
+        # a table of heights serves all light above its shortest wavelength
+        heights = isinstance(table, DiffractionTable)
+        low, high = (table.wavelength_range[0], math.inf) if heights else table.wavelengths
+        lam = self._within(low, high, file)
         return self._spectrum(table, self.geometry, lam, angular=args.iridescence)
+
+    def _within(self, low: float, high: float, file: Path) -> Any:
+        """Return the wavelengths that a table has, nm.
+
+        Raises a DiffractionError if --wavelength-range names others, or it has none.
+        """
+        lam, first, last = self.lam, f"{self.lam[0]:g}", f"{self.lam[-1]:g}"
+        inside = lam[(lam >= low) & (lam <= high)]
+        known = f"from {low:g} nm on" if math.isinf(high) else f"from {low:g} to {high:g} nm"
+        if len(inside) < len(lam) and (self.args.wavelength_range is not None or not len(inside)):
+            raise DiffractionError(
+                f"'{file}' has light {known}, and the wavelengths are {first} to {last} nm; give "
+                "others by --wavelength-range, or make a table of a wider range"
+            )
+        if len(inside) < len(lam):
+            self._say_once(f"'{file}' has light {known}: other wavelengths are left out")
+        return inside
 
     def _of_heights(self, source: TableSource, file: Path, how: Any) -> Spectra:
         """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
@@ -154,20 +171,3 @@ class Measurement:
         self._noted += 1
         if self._noted == 1 or stands_in_full(line):
             say(line)
-
-
-def _within(table: OrderTable, lam: Any, file: Path) -> Any:
-    """Return the wavelengths that a table of orders has.
-
-    Raises a DiffractionError if it has none of them.
-    """
-    low, high = table.wavelengths
-    inside = lam[(lam >= low) & (lam <= high)]
-    if not len(inside):
-        raise DiffractionError(
-            f"'{file}' has orders of {low:g} to {high:g} nm, and none of {lam[0]:g} to "
-            f"{lam[-1]:g} nm; choose others by --wavelength-range"
-        )
-    if len(inside) < len(lam):
-        say(f"'{file}' has orders of {low:g} to {high:g} nm: other wavelengths are left out")
-    return inside

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
+from ..images import save_figure
 from ..scene.passes import Result
 from ..scene.pictures import write_exr
 from . import options
 from .console import say
-from .report import Figures, elapsed, save_figure
+from .report import Figures, elapsed
 
 if TYPE_CHECKING:
     from ..analysis.observers import Eye
@@ -77,7 +78,7 @@ def save_observed(
     width, height = result.bitmap.size()
     print(
         f"{exr} and {png}: {width} x {height} pixels, channels {', '.join(eye.names)}, "
-        f"{result.spp} samples per pixel, {elapsed(args):.1f} s, {variant}"
+        f"{counted(result.spp, 'sample')} per pixel, {elapsed(args):.1f} s, {variant}"
     )
     return {
         "scene": args.scene, "files": [exr, png], "observer": args.observer,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..errors import counted
 from . import options
 from .options import number_between
 from .report import Figures, output_of
@@ -63,7 +64,8 @@ def run(args: argparse.Namespace) -> Figures:
         if known < len(rows):
             light += " (solve --polarised --theta --phi --step has it at the light that it lists)"
     print(
-        f"{args.table} -> {output}: {len(rows)} lines, {len(np.unique(rows[:, 0]))} wavelengths, "
-        f"{len(np.unique(rows[:, 1:3], axis=0))} directions, {listing.orders}, {light}"
+        f"{args.table} -> {output}: {counted(len(rows), 'line')}, "
+        f"{counted(len(np.unique(rows[:, 0])), 'wavelength')}, "
+        f"{counted(len(np.unique(rows[:, 1:3], axis=0)), 'direction')}, {listing.orders}, {light}"
     )
     return {"file": str(output), "columns": listing.columns, "lines": rows.tolist()}

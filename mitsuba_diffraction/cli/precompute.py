@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import warn
+from ..errors import counted, warn
 from ..files import FileKind, kind_of
 from ..system import peak_memory
 from . import options
@@ -85,8 +85,8 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
         print(f"  {label:<6} {text}")
     if workers:
         print(
-            f"  work   {workers['tasks']} tasks of windows, {workers['retries']} given out again, "
-            f"{workers['busy']:.1f} s of workers' work"
+            f"  work   {counted(workers['tasks'], 'task')} of windows, {workers['retries']} "
+            f"given out again, {workers['busy']:.1f} s of workers' work"
         )
     return {"file": str(output), **table.summary(), **({"workers": workers} if workers else {})}
 
@@ -131,8 +131,9 @@ def _report(
             yield (
                 "",
                 (
-                    f"mean of {windows['number']} windows of {width:.4g} x {height:.4g} µm; its "
-                    f"standard error is {error['glossy']:.2g} of the light near order 0, and "
+                    f"mean of {counted(windows['number'], 'window')} of {width:.4g} x "
+                    f"{height:.4g} µm; its standard error is "
+                    f"{error['glossy']:.2g} of the light near order 0, and "
                     f"{error['colours']:.2g} of that of all other orders"
                 ),
             )
@@ -140,7 +141,7 @@ def _report(
         yield "", f"orders vary by {table.source['variation']:.2g} of their mean between patches"
     intervals, ny, nx, _, terms = table.coefficients.shape
     size = (
-        f"{nx} x {ny} orders, {terms} terms in {intervals} intervals of κ, "
+        f"{nx} x {ny} orders, {counted(terms, 'term')} in {counted(intervals, 'interval')} of κ, "
         f"{' x '.join(map(str, table.grid.taps))} taps; "
         f"{table.expansion.basis} {table.expansion.kind}, {table.coefficients.dtype}, "
         f"{table.nbytes / 1e6:.3g} MB in memory, {output.stat().st_size / 1e6:.3g} MB on disk"

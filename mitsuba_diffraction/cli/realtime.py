@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..realtime.glsl.methods import METHODS, WEB_METHODS
 from ..scene import load_scene, set_variant
 from ..scene.load import sensor_of
@@ -105,8 +105,8 @@ def compare(args: argparse.Namespace) -> Figures:
 
     variant = _set_variant(args)
     every = "all" in args.method
-    with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
-        bar(0, args.spp, "loading")
+    with mitsuba_warnings(), Bar(args, delay=0) as bar:
+        bar(0, 0, "loading")
         comparison = Comparison(
             _scene(args, parameters), str(args.scene), variant, folder, args.sensor, args.spp,
             args.full_spp, args.frames // 4 * 4, args.supersampling, args.seed, bar,
@@ -207,7 +207,7 @@ def export_shader(args: argparse.Namespace) -> Figures:
     code, *textures = (file.stat().st_size for file in files)
     print(
         f"{folder}: {', '.join(shader.functions.values())}: {code / 1e3:.1f} kB of GLSL, "
-        f"{len(textures)} textures of {sum(textures) / 1e6:.1f} MB, "
+        f"{counted(len(textures), 'texture')} of {sum(textures) / 1e6:.1f} MB, "
         f"{elapsed(args):.1f} s; {shader.surface}"
     )
     return {"source": args.source, "folder": folder, "files": files,

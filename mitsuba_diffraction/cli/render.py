@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..extras import optional
 from ..scene import load_scene, set_variant
 from ..scene.denoise import denoised
@@ -20,6 +20,7 @@ from ..scene.frames import (
     FILMS,
     Frame,
     check_film,
+    check_frames,
     digest_of,
     render_frames,
     write_film,
@@ -32,7 +33,7 @@ from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
 from .animation import ANIMATION, say_why
 from .console import Bar, mitsuba_warnings, say, say_warning
-from .interrupt import INTERRUPTED
+from .interrupt import INTERRUPTED, keep_in_mind
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
 from .report import Figures, check_outputs, default_output, elapsed, output_name, output_of
@@ -153,6 +154,7 @@ def _on_workers(args: argparse.Namespace) -> Figures:
 
     variant = set_variant(args.mode)
     keep = outputs.named.with_name(f"{outputs.named.name}.passes")
+    keep_in_mind(f"finished passes are kept in '{keep}': run the command again to go on")
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
         if outputs.only_png:
@@ -162,9 +164,7 @@ def _on_workers(args: argparse.Namespace) -> Figures:
                 report = _finish(args, result, outputs, variant, film.scene)
                 film.forget(0)
                 return report | {"workers": say_report(film)}
-    say(f"interrupted; finished passes are kept in '{keep}': run the command again to go on")
-    args.code = INTERRUPTED
-    return {}
+    raise KeyboardInterrupt
 
 
 def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
@@ -177,7 +177,7 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
     )
     with mitsuba_warnings():
         with Bar(args, unit=" spp", delay=0) as bar:
-            bar(0, args.spp or 0, "loading")
+            bar(0, 0, "loading")
             scene = whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
             sensor = sensor_of(scene, args.sensor, args.preview)
             spp = args.spp or preview_samples(sensor, args.preview)
@@ -191,7 +191,7 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
         if result.spp == 0:
             raise KeyboardInterrupt  # interrupted before the first pass, without a picture
         if result.interrupted:
-            say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
+            say(f"interrupted; the picture has {result.spp} of {counted(spp, 'sample')} per pixel")
             args.code = INTERRUPTED
         report = _finish(args, result, outputs, variant, scene, eye)
         if args.denoise:
@@ -207,7 +207,7 @@ def _finish(
 ) -> Figures:  # fmt: skip
     """Write the picture, print warnings and a summary, and return the figures for --json."""
     if bad := count_bad(result.bitmap):
-        say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
+        say_warning(f"{counted(bad, 'pixel')} not finite (NaN or infinite): black in a PNG")
     if eye is not None:
         return save_observed(args, eye, result, outputs.named, outputs.png, variant)
     written = []
@@ -221,7 +221,7 @@ def _finish(
     else:
         write_png(colours, outputs.png, args.exposure, args.view)
         written.append(outputs.png)
-    (width, height), samples = result.bitmap.size(), f"{result.spp} samples"
+    (width, height), samples = result.bitmap.size(), counted(result.spp, "sample")
     seconds, surfaces = elapsed(args), surfaces_text(scene)
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
@@ -269,16 +269,17 @@ def _run_frames(args: argparse.Namespace) -> Figures:
     say_why(reasons)
 
     done, workers = 0, None
-    if to_do and on_workers(args):
-        done, workers = _frames_on_workers(args, to_do, folder)
-    elif to_do:
+    if to_do:
         variant = set_variant(args.mode)
-        with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
-            bar(0, 0, "loading")
-            for _ in render_frames(
-                args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
-            ):
-                done += 1
+        with mitsuba_warnings():
+            with Bar(args, delay=0) as bar:
+                bar(0, 0, "checking the frames")
+                check_frames(args.scene, to_do)
+            keep_in_mind(f"finished frames are in '{folder}': run the command again to continue")
+            if on_workers(args):
+                done, workers = _frames_on_workers(args, to_do, folder, variant)
+            else:
+                done = _frames_here(args, to_do, variant)
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
               "interrupted": done < len(to_do), "seconds": elapsed(args),
@@ -291,22 +292,34 @@ def _run_frames(args: argparse.Namespace) -> Figures:
         )
         args.code = INTERRUPTED
         return report
-    print(f"{folder}: {len(frames)} frames, {done} of them new, {report['seconds']:.1f} s")
+    print(
+        f"{folder}: {counted(len(frames), 'frame')}, {done} of them new, {report['seconds']:.1f} s"
+    )
     if film is not None:
         write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
     return report | {"film": film}
 
 
+def _frames_here(args: argparse.Namespace, to_do: Sequence[Frame], variant: str) -> int:
+    """Render frames in this process; return how many were finished."""
+    with Bar(args, unit=" spp", delay=0) as bar:
+        bar(0, 0, "loading")
+        frames = render_frames(
+            args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
+        )  # fmt: skip
+        return sum(1 for _ in frames)
+
+
 def _frames_on_workers(
-    args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
+    args: argparse.Namespace, to_do: Sequence[Frame], folder: Path, variant: str
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; return how many were finished, and what the workers did."""
     from ..cluster import FrameRequest
 
-    variant, done = set_variant(args.mode), 0
+    done = 0
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
-    with mitsuba_warnings(), client_of(args) as client:
+    with client_of(args) as client:
         film = film_of(args, client, wanted, variant, folder / "passes")
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for frame, result in zip(to_do, film.render(stop, bar), strict=False):

@@ -27,12 +27,15 @@ STDOUT = Path("-")
 # Keys of height-field summaries, which are in µm throughout, and suffixes of keys that say so.
 _UNITS = {"pixel_size": "µm", "extent": "µm", "range": "µm", "rms_height": "µm"}
 _SUFFIXES = {"_um": "µm", "_nm": "nm", "_mb": "MB", "_s": "s", "_deg": "°"}
+_SHAPE = "shape"
 _INDENT = "  "
 
 
 def lines_of(data: Mapping[str, Any], depth: int = 0) -> Iterator[str]:
     """Yield a line for each value: keys in words, aligned; nested mappings are indented."""
-    rows = [(*_label(key), value) for key, value in data.items()]
+    # of arrays (ny, nx), which people are told as pixels along x and y, as extents
+    turned = ((k, v[::-1] if k == _SHAPE and isinstance(v, list) else v) for k, v in data.items())
+    rows = [(*_label(key), value) for key, value in turned]
     width = max((len(label) for label, _, value in rows if not _nested(value)), default=0)
     margin = _INDENT * depth
     for label, unit, value in rows:
@@ -75,15 +78,6 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def save_figure(path: Path, figure: Any, **how: Any) -> None:
-    """Write a figure of Matplotlib in the format of the suffix.
-
-    how : more arguments of `matplotlib.figure.Figure.savefig`.
-    """
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], **how)
-
-
 def save_report(args: argparse.Namespace, figures: Figures) -> None:
     """Write the file of --json, if it is requested and there are figures."""
     if figures and args.json not in (None, STDOUT):
@@ -97,6 +91,7 @@ def elapsed(args: argparse.Namespace) -> float:
 
 def _label(key: str) -> tuple[str, str]:
     unit = _UNITS.get(key, "")
+    key = "pixels" if key == _SHAPE else key
     for suffix, its_unit in _SUFFIXES.items():
         if not unit and key.endswith(suffix):
             key, unit = key.removesuffix(suffix), its_unit

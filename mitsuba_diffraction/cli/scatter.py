@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ..columns import save_numbers
+from ..images import save_figure
 from . import options
 from .console import Bar, say_warning
-from .report import Figures, beside, output_of, save_figure
+from .report import Figures, beside, output_of
 
 #: He-Ne laser, nm.
 _WAVELENGTH = 632.8

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from ..errors import DiffractionError, quoted
-from ..files import MESHES, OTHER_MESHES, readable_file
+from ..files import MESHES, OTHER_MESHES, FileKind, kind_of, readable_file
 from ..scene.parameters import Change, change_of
 from .options import MODE, whole_number
 
@@ -90,6 +90,14 @@ def put_on_stage(args: argparse.Namespace) -> None:
         raise DiffractionError(
             f"mesh '{args.scene}': Mitsuba does not read {suffix}; convert it to PLY or OBJ, as "
             "Blender's export does"
+        )
+    kind = kind_of(args.scene)
+    # any other content may be a scene without a suffix
+    scenes = FileKind.SCENE, FileKind.MESH, FileKind.INSTRUMENT
+    if kind not in scenes and args.scene.is_file():
+        raise DiffractionError(
+            f"'{args.scene}' ({kind}) is neither a scene (XML) nor a mesh; put it on a mesh by "
+            "--patch, on a surface of a scene by --assign, or look at it by 'brdf-map'"
         )
     if suffix not in MESHES:
         if args.patch is not None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -239,8 +239,9 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
         def announce(estimate: Estimate) -> None:
             size = f" for a table of {estimate.size / 1e6:.2g} MB" if estimate.size else ""
             say(
-                f"{estimate.stage}: {estimate.solutions} solutions at {estimate.stations} "
-                f"stations, about {_time(estimate.seconds / processes)}{size}; results are kept "
+                f"{estimate.stage}: {counted(estimate.solutions, 'solution')} at "
+                f"{counted(estimate.stations, 'station')}, about "
+                f"{_time(estimate.seconds / processes)}{size}; results are kept "
                 f"in '{folder}'{limits}"
             )
 

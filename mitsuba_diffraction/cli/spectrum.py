@@ -9,14 +9,15 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionError
-from ..scene import set_variant
+from ..errors import DiffractionError, counted
+from ..images import save_figure
+from ..scene.load import set_variant
 from . import options
 from .brdf_map import surface_options, surface_parameters
 from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
-from .report import Figures, elapsed, output_of, save_figure
+from .report import Figures, elapsed, output_of
 
 if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
@@ -130,7 +131,7 @@ def run(args: argparse.Namespace) -> Figures:
     everything = files_of_spectra.on_common_wavelengths(
         {name: parts for name, (_, parts) in measured.items()}
     )
-    if any(s.wavelength.size < lam.size for s in everything[first]):
+    if len(files) > 1 and everything[first][0].wavelength.size < lam.size:
         common = everything[first][0].wavelength
         say(f"columns are from {common[0]:g} to {common[-1]:g} nm, which every table has")
     spectra = {name: mean_spectra(parts) for name, parts in everything.items()}
@@ -148,9 +149,10 @@ def run(args: argparse.Namespace) -> Figures:
     shown = spectra[first]
     lam = shown.wavelength
     print(
-        f"{' and '.join(map(str, written))}: {len(shown.geometry.detectors)} spectra of {lam.size} "
-        f"wavelengths, {lam[0]:g} to {lam[-1]:g} nm, {title}, {elapsed(args):.1f} s, "
-        f"{variant}"
+        f"{' and '.join(map(str, written))}: "
+        f"{counted(len(shown.geometry.detectors), 'spectrum', 'spectra')} of "
+        f"{counted(lam.size, 'wavelength')}, {lam[0]:g} to {lam[-1]:g} nm, {title}, "
+        f"{elapsed(args):.1f} s, {variant}"
     )
     for name, each in spectra.items():
         if 100.0 * each.value.max() < _NOTHING:
@@ -267,10 +269,11 @@ def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:
 def _title(groups: dict[str, list[Path]], args: argparse.Namespace) -> str:
     """Describe the measurement in words."""
     first, *others = (file for members in groups.values() for file in members)
-    crops = f", {args.crops} crops each" if others else f", {args.crops} crops"
-    cut = crops if args.crops else ""
+    each = " each" if others else ""
+    cut = f", {counted(args.crops, 'crop')}{each}" if args.crops else ""
     if "" not in groups:
-        return ", ".join(f"{name} ({len(files)} scans)" for name, files in groups.items()) + cut
+        named = (f"{name} ({counted(len(files), 'scan')})" for name, files in groups.items())
+        return ", ".join(named) + cut
     return (f"mean of {1 + len(others)} scans" if others else first.name) + cut
 
 

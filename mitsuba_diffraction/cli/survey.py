@@ -10,12 +10,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
-from ..scene import set_variant
+from ..errors import DiffractionError, counted
+from ..scene.load import set_variant
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
-from .interrupt import INTERRUPTED
+from .interrupt import keep_in_mind
 from .options import number_between, whole_number
 from .report import Figures, elapsed, output_of
 from .workers import THREADS, WORKERS, client_of, on_workers, say_files, worker_threads
@@ -51,13 +51,7 @@ _SIZES = 1.5
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Measure new scans, and return the figures."""
-    try:
-        rows = _measured(args)
-    except KeyboardInterrupt:
-        folder = args.output or "survey"
-        say(f"interrupted; finished scans are in '{folder}': run the command again to go on")
-        args.code = INTERRUPTED
-        return {}
+    rows = _measured(args)
     for row in rows:
         if row["reason"]:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
@@ -80,14 +74,16 @@ def run(args: argparse.Namespace) -> Figures:
         )
     whole = sum("crop" not in row for row in rows if not row["reason"])
     if args.crops is not None and whole:
-        say(f"{whole} of the scans have no crops of {WINDOW:g} µm and are measured as a whole")
-    measured = "scans" if args.crops is None else "crops and whole scans"
+        say(f"measured as a whole, without crops of {WINDOW:g} µm: {counted(whole, 'scan')}")
+    done, samples = len(rows) - failed, len({row["sample"] for row in rows})
+    measured = counted(done, "scan")
+    if args.crops is not None:
+        measured = counted(done, "crop or whole scan", "crops and whole scans")
     seconds = elapsed(args)
     surface = next((f"{row['surface']}, " for row in rows if not row["reason"]), "")
     print(
-        f"{args.output}: {len(rows) - failed} {measured} in "
-        f"survey.csv, {failed} failed, "
-        f"{len({row['sample'] for row in rows})} samples in samples.csv, {surface}{seconds:.1f} s"
+        f"{args.output}: {measured} in survey.csv, {failed} failed, "
+        f"{counted(samples, 'sample')} in samples.csv, {surface}{seconds:.1f} s"
     )
     args.code = 1 if failed else 0
     return {"rows": rows, "seconds": seconds}
@@ -111,6 +107,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
 
     args.files = scan_files(args.files)
     args.output = output_of(args, Path("survey"), files_in, make_folder=True)
+    keep_in_mind(f"finished scans are in '{args.output}': run the command again to go on")
 
     from ..analysis.scans import check_surface
     from ..analysis.survey import run_survey

@@ -10,11 +10,12 @@ from typing import Any
 
 from ..columns import save_rows
 from ..errors import DiffractionError, DiffractionWarning
-from ..scene import set_variant
+from ..images import save_figure
+from ..scene.load import set_variant
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
-from .report import Figures, beside, elapsed, output_of, save_figure
+from .report import Figures, beside, elapsed, output_of
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
@@ -96,7 +97,8 @@ def _values(args: argparse.Namespace) -> list[Any] | None:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
         text = " ".join(args.values)
-        raise DiffractionError(f"--values: expected numbers, got '{text}'") from error
+        line = f"--values: expected numbers, blanks between, got '{text}'"
+        raise DiffractionError(line) from error
 
 
 def _compiled(

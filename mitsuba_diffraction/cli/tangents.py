@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import counted
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between, path_ending_in
@@ -53,7 +54,7 @@ def run(args: argparse.Namespace) -> Figures:
         bar(0, 0, "writing")
         write_ply(args.output, mesh, f"{args.mesh.name}, patch along {args.along}")
     print(
-        f"{args.output}: {len(mesh.faces)} triangles, patch along {args.along}, "
+        f"{args.output}: {counted(len(mesh.faces), 'triangle')}, patch along {args.along}, "
         f"{'texture coordinates kept' if uv is not None else 'had no texture coordinates'}"
     )
     report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces, mesh.orientation)
@@ -98,6 +99,6 @@ def _places(places: object, indices: object, report: TangentReport) -> str:
     ]
     more = f" and {len(points) - _NAMED} more" if len(points) > _NAMED else ""
     return (
-        f"{len(points)} singular points, with the turns around each: {', '.join(named)}{more}; "
-        f"together {turns.sum():+d}"
+        f"{counted(len(points), 'singular point')}, with the turns around each: "
+        f"{', '.join(named)}{more}; together {turns.sum():+d}"
     )

@@ -10,8 +10,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import counted
 from ..system import cores
-from .console import say, say_warning
+from .console import Bar, say, say_warning
 from .options import Group, refuse, whole_number
 
 if TYPE_CHECKING:
@@ -71,10 +72,12 @@ def film_of(
     """Return the renderer of the command's frames on workers."""
     from ..cluster import FrameSequence
 
-    film = FrameSequence(
-        client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
-        preview=args.preview, threads=worker_threads(args),
-    )  # fmt: skip
+    with Bar(args, delay=0) as bar:
+        bar(0, 0, "loading")
+        film = FrameSequence(
+            client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
+            preview=args.preview, threads=worker_threads(args),
+        )  # fmt: skip
     say_files(path for task in film.frames for path, _ in task.files.files)
     say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
     return film
@@ -94,12 +97,13 @@ def say_report(film: FrameSequence) -> dict[str, Any]:
     """Print the workers' statistics in a line, and return them as plain data."""
     report = film.report.summary()
     kept = f", {report['kept']} stored before" if report["kept"] else ""
-    lost = f", {report['lost']} workers lost" if report["lost"] else ""
+    lost = f", {counted(report['lost'], 'worker')} lost" if report["lost"] else ""
     again = f", {report['retries']} given out again" if report["retries"] else ""
     print(
-        f"workers: {report['tasks']} tasks in {report['groups']} sums{kept}{again}{lost}, "
+        f"workers: {counted(report['tasks'], 'task')} in "
+        f"{counted(report['groups'], 'sum')}{kept}{again}{lost}, "
         f"{report['busy']:.1f} s of work by "
-        f"{len(report['workers'])} workers in {report['seconds']:.1f} s, "
+        f"{counted(len(report['workers']), 'worker')} in {report['seconds']:.1f} s, "
         f"{report['overhead_per_task_s']:.2g} s a task beside it, {report['bytes'] / 1e6:.3g} MB, "
         f"{report['peak'] / 1e9:.2g} GB of memory at most"
     )

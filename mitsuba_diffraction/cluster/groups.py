@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..progress import Progress
 from ..scene.passes import Span, Stop
 from .kept import Kept
@@ -168,7 +168,7 @@ class Groups:
             self._give_out()
             self._take()
             what = f"frame {number + 1} of {len(self._frames)}, " if len(self._frames) > 1 else ""
-            text = f"{what}{self._headcount.now()} workers"
+            text = f"{what}{counted(self._headcount.now(), 'worker')}"
             self._progress(self._total - self._left, self._total, text)
             time.sleep(_POLL)
 

@@ -24,9 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, one_line
-from ..scene import load_scene, set_variant
-from ..scene.load import sensor_of
+from ..errors import DiffractionError, counted, one_line
+from ..scene.load import load_scene, sensor_of, set_variant
 from ..scene.parameters import files_of
 from ..scene.passes import Pass, Span, added, integrator_of, render_pass
 from ..system import cores, peak_memory, processor
@@ -182,7 +181,7 @@ def _sums(task: Task) -> Sums:
 
     total = added(task.span, sum_of)
     peak = peak_memory()
-    where = f"{processor()}, {threads} threads"
+    where = f"{processor()}, {counted(threads, 'thread')}"
     return Sums(total, (where,), (worker_address(),), 1, time.perf_counter() - start, peak)
 
 

@@ -186,6 +186,10 @@ def blur(width: float, medium: float = 1.0) -> str:
     )
 
 
+#: Part of the warning of such a patch.
+COLOURLESS = "narrower than two wavelengths and has no colours"
+
+
 def window_warning(width: float, patches: Sequence[HeightField]) -> str:
     """Return a warning of a window, µm, that is wider than the patch or too narrow; else ""."""
     first, widest = patches[0], widest_window(patches)
@@ -193,7 +197,7 @@ def window_warning(width: float, patches: Sequence[HeightField]) -> str:
     if widest < NARROWEST:
         return (
             f"{first.name}: use a larger scan, or check its pixel size, which is in µm: a patch of "
-            f"{size} µm is narrower than two wavelengths and has no colours"
+            f"{size} µm is {COLOURLESS}"
         )
     if not repeats(width, patches):
         return ""

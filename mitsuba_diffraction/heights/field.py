@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Real
-from ..errors import DiffractionError
+from ..errors import DiffractionError, quoted
 from ..limits import MOST_PIXELS
 from .lengths import LONGEST_HEIGHT, PixelSize, pixel_size_of
 
@@ -76,6 +76,9 @@ class HeightField:
                 f"{name}: pixel_size is missing; give the distance between samples in µm, "
                 "one number or (dx, dy)"
             )
+        for flag, value in (("cut_out", cut_out), ("periodic", periodic)):
+            if not isinstance(value, bool | np.bool_):  # "open" would be true
+                raise DiffractionError(f"{name}: {flag}={quoted(value)} must be True or False")
         checked, offset = _checked_heights(heights, name)
         if offset:
             history = (*history, f"a constant offset of {offset:.6g} µm was subtracted")

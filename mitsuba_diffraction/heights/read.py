@@ -194,6 +194,8 @@ def _read(file: Path, kind: FileKind, channel: str | int | None) -> tuple[RawHei
     """Read the heights of a file; also return whether an instrument wrote it."""
     if kind is FileKind.JPEG:
         raise DiffractionError(f"{str(file)!r} {way_out(file, beginning(file, 8))}")
+    if kind is FileKind.RESULT:
+        raise DiffractionError(f"{str(file)!r} is a {kind}, which has no heights; name the scan")
     if kind in (FileKind.EXR, FileKind.TABLE):
         return read_exr(file, None if channel is None else str(channel)), False
     if kind not in _READERS:

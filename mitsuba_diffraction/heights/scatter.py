@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..arrays import Real
-from ..errors import DiffractionError, warn
+from ..errors import DiffractionError, counted, warn
 from .field import HeightField
 from .spectra import frequencies, height_spectrum
 
@@ -127,8 +127,8 @@ def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg | None:
     if used.sum() < _FEWEST:
         raise DiffractionError(
             f"{wavelength:g} nm: the spectrum from {spectrum.band[0]:.3g} to "
-            f"{spectrum.band[1]:.3g} µm has {used.sum()} rings within sin θ < 1, and an ABg model "
-            f"needs {_FEWEST}; take a larger patch, or a shorter wavelength"
+            f"{spectrum.band[1]:.3g} µm has {counted(int(used.sum()), 'ring')} within sin θ < 1, "
+            f"and an ABg model needs {_FEWEST}; take a larger patch, or a shorter wavelength"
         )
     beta = beta[used]
     # rings of few modes are known least

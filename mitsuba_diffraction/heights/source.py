@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..files import FileKind, kind_of, readable_file
 from ..settings import TableSettings
 from . import gratings
@@ -262,7 +262,7 @@ def notes_line(
         numbers = value if isinstance(value, tuple) else (value,)
         text = ",".join(n if isinstance(n, str) else f"{n:.9g}" for n in numbers)
         words += [f"--{name.replace('_', '-')}", text]
-    number = "1 note" if len(lines) == 1 else f"{len(lines)} notes"
+    number = counted(len(lines), "note")
     grave = "".join(f"{line}; " for line in lines if stands_in_full(line))
     return f"{grave}{number} on '{Path(path).name}': {shlex.join(words)}"
 

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Real
+from ..errors import counted
+from .coherence import COLOURLESS
 from .field import LARGE, HeightField, blocks
 from .preprocess import MAD_TO_SIGMA, level_plane, level_quadratic, plane_of, plane_rise
 from .spectra import seen_slope
@@ -29,6 +31,7 @@ SMALLEST_RANGE = 1e-5
 IMPOSSIBLE_SLOPE = 10.0
 #: Words of the warnings that no command shortens.
 UNRELIABLE, AS_FACET = "do not rely on its colours", "taken for a facet"
+_IN_METRES, _IN_NM = "less than an atom", "in nm? Then divide"
 #: Pixel size in µm beyond which the patch resolves at most a tenth of the directions at 380 nm.
 #: Scans have pixels of some nm to a few hundred.
 COARSEST_PIXEL = 2.0
@@ -114,7 +117,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     if 0 < field.range < SMALLEST_RANGE:
         lines.append(
             f"{field.name}: multiply the heights by 1e6 if they are in metres: they span only "
-            f"{field.range:.2g} µm, less than an atom"
+            f"{field.range:.2g} µm, {_IN_METRES}"
         )
     if field.cut_out:
         if tilted(field, shortest):
@@ -136,7 +139,8 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
 
 def stands_in_full(line: str) -> bool:
     """Return whether commands print a warning itself, beside the number of the others."""
-    return UNRELIABLE in line or AS_FACET in line
+    grave = UNRELIABLE, AS_FACET, _IN_METRES, _IN_NM, COLOURLESS
+    return any(part in line for part in grave)
 
 
 def _facet(field: HeightField, level: HeightField) -> bool:
@@ -189,11 +193,11 @@ def units_warning(field: HeightField) -> str:
     """Return a warning that lengths look like nanometres read as µm, or "" if plausible."""
     coarse = max(field.pixel_size)
     if coarse > COARSEST_PIXEL:
-        return f"is the pixel size of {coarse:.4g} µm in nm? Then divide it by 1000"
+        return f"is the pixel size of {coarse:.4g} µm {_IN_NM} it by 1000"
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         return (
-            f"are the heights, with a range of {field.range:.4g} µm, in nm? Then divide them (of "
-            "an image: max_height) by 1000"
+            f"are the heights, with a range of {field.range:.4g} µm, {_IN_NM} them (of an image: "
+            "max_height) by 1000"
         )
     return ""
 
@@ -223,7 +227,9 @@ def _aborted(field: HeightField) -> str:
 
 
 def _repeated(field: HeightField) -> str:
-    """Return a line on rows that repeat the one before."""
+    """Return a line on rows that repeat the one before, unless gaps were filled so."""
+    if any("method nearest" in line for line in field.history):
+        return ""
     repeats = _is_straight(np.diff(field.heights, axis=0)) & ~_is_straight(field.heights)[1:]
     count = int(repeats.sum())
     if not FEWEST <= count < 0.5 * len(repeats):
@@ -264,8 +270,9 @@ def _dust(field: HeightField) -> str:
     if without > WITHOUT_DUST * rms:
         return ""
     return (
-        f"{field.name}: use clip={CLIP} if they are dust or spikes: {int(outside.sum())} points "
-        f"({share:.2g} of all) are up to {np.abs(level - median).max():.3g} µm from the others, "
+        f"{field.name}: use clip={CLIP} if they are dust or spikes: "
+        f"{counted(int(outside.sum()), 'point')} ({share:.2g} of all) up to "
+        f"{np.abs(level - median).max():.3g} µm from the others, "
         f"and the RMS height is {rms:.3g} µm with them, {without:.3g} µm without"
     )
 

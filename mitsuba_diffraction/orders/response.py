@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Real
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from . import cells
 from .cells import B, Counts
 
@@ -97,7 +97,7 @@ class CellResponse:
     def layout(self) -> str:
         """Size, for people."""
         sizes = sorted({" x ".join(map(str, band.counts)) for band in self.bands})
-        return f"{len(self.bands)} bands of {', '.join(sizes)} nodes"
+        return f"{counted(len(self.bands), 'band')} of {', '.join(sizes)} nodes"
 
     def check(self, sides: int, last_band: int) -> None:
         """Raise a DiffractionError if sizes do not fit a table, or numbers are no efficiencies.
@@ -107,8 +107,8 @@ class CellResponse:
         expected = last_band + 1
         if [band.k for band in self.bands] != list(range(expected)):
             raise DiffractionError(
-                f"{len(self.bands)} bands, expected {expected}, k = 0 to {expected - 1}, by "
-                "the table's period, shortest wavelength and index"
+                f"{counted(len(self.bands), 'band')}, expected {expected}, k = 0 to "
+                f"{expected - 1}, by the table's period, shortest wavelength and index"
             )
         for band in self.bands:
             _check_band(band, sides, self.elements)
@@ -161,7 +161,10 @@ class ListedResponse:
     def layout(self) -> str:
         """Size, for people."""
         waves, theta, phi = map(len, self.axes)
-        return f"{waves} wavelengths x {theta} theta x {phi} phi, {len(self.orders)} orders"
+        return (
+            f"{counted(waves, 'wavelength')} x {theta} theta x {phi} phi, "
+            f"{counted(len(self.orders), 'order')}"
+        )
 
     def lacks_directions(self, crossed: bool) -> bool:
         """Whether some light is far from all listed directions, of which there are several."""

@@ -8,7 +8,7 @@ albedo a reaches a nested BSDF.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..optics import fresnel
 from ..optics.coat import coated_reflectance, cosine_within
 from ..optics.stack import Stacked
+from ..progress import show
 from ..tables import DiffractionTable
 from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy import conserved
@@ -117,10 +118,10 @@ class EnergyModel:
         if self._place is None:
             (energy,) = self._energies
             nodes = self._factors.nodes(energy)
-            return nodes, scales_of([sides_of(energy, energy.at(node)) for node in nodes])
-        height = self._factors.height_scale
+            return nodes, scales_of([sides_of(energy, energy.at(node)) for node in _counted(nodes)])
+        height, energies = self._factors.height_scale, _counted(self._energies)
         places = np.linspace(0.0, 1.0, len(self._energies)).tolist()
-        return places, scales_of([_at_height(each, sides_of, height) for each in self._energies])
+        return places, scales_of([_at_height(each, sides_of, height) for each in energies])
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""
@@ -169,6 +170,13 @@ class EnergyModel:
         if sides is None:
             return None
         return DirectionalTable(sides[0].wavelengths * centre, sides[0].values)
+
+
+def _counted(parts: Sequence[Any]) -> Iterator[Any]:
+    """Yield parts of the work while their number is shown: each takes up to seconds."""
+    for number, part in enumerate(parts):
+        show(number, len(parts), "scales of energy")
+        yield part
 
 
 def _at_height(

@@ -417,6 +417,8 @@ def resolved_path(name: str, parameter: str) -> Path:
 
     Raises a DiffractionError if the file is missing, with the folders.
     """
+    if not name:  # the first folder
+        raise DiffractionError(f"{parameter} is empty; name a file")
     resolver = mi.file_resolver()
     path = Path(str(resolver.resolve(name)))
     if path.exists() or path.is_absolute():

@@ -17,6 +17,7 @@ from ..heights import HeightField, LoadOptions
 from ..heights.lengths import is_auto
 from ..heights.preprocess import fill_missing
 from ..heights.read import fill_method, treat
+from ..progress import show
 from ..settings import SURFACE, checked
 from ..tables import DiffractionTable, TableSource
 from ..tables.source import loaded_table
@@ -96,7 +97,7 @@ def _built(
 ) -> Patch:
     """Return the table of heights, from the cache or built, and the heights."""
     settings = source.settings_for(asked, height_scale)
-    table = source.table(settings, height_scale=height_scale, stretch=stretch, progress=_logged)
+    table = source.table(settings, height_scale=height_scale, stretch=stretch, progress=show)
     _warn_of_limits(table, source)
     return Patch(table, partial(_field_of, source, stretch))
 
@@ -114,12 +115,6 @@ def _warn_of_limits(table: DiffractionTable, source: TableSource) -> None:
             f"{y:.4g} rad/µm along y (frequency_limit): light that the surface sends beyond is "
             "missing"
         )
-
-
-def _logged(done: int, total: int, text: str) -> None:
-    """Log the begin of a table's building."""
-    if not done:
-        mi.Log(mi.LogLevel.Info, f"diffraction: {text}")
 
 
 def _heights_of(data: Any, options: LoadOptions) -> HeightField:

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..arrays import Complex, Real
-from ..errors import DiffractionError, check_keys, quoted
+from ..errors import DiffractionError, check_keys, counted, quoted
 from ..files import read_toml
 from ..heights.lengths import count_between, number_between
 from ..limits import MOST_LAYERS, check_count
@@ -97,8 +97,8 @@ def read_layers(path: Path) -> Layers:
     layers = Layers(tuple(materials) * repeat, spread, path.name)
     if layers.path > MOST_PATH:
         raise DiffractionError(
-            f"{shown}: {len(layers.materials)} layers with 2 Σ n d = {1e-3 * layers.path:.3g} µm; "
-            f"at most {1e-3 * MOST_PATH:g} µm interfere"
+            f"{shown}: {counted(len(layers.materials), 'layer')} with 2 Σ n d = "
+            f"{1e-3 * layers.path:.3g} µm; at most {1e-3 * MOST_PATH:g} µm interfere"
         )
     return layers
 
@@ -184,9 +184,9 @@ class UnderStack(Material):
         return self.layers.absorbs
 
     def __str__(self) -> str:
-        count, spread = len(self.layers.materials), self.layers.spread
+        count, spread = counted(len(self.layers.materials), "layer"), self.layers.spread
         spread_text = f", spread {spread:g}" if spread else ""
-        return f"{self.material} under stack[{self.layers.name}, {count} layers{spread_text}]"
+        return f"{self.material} under stack[{self.layers.name}, {count}{spread_text}]"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

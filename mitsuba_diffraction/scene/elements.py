@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..plugin.description import Surface, describe
 from ..plugin.parameter_changes import children
 from ..plugin.textures import is_attribute
@@ -63,7 +63,7 @@ def surfaces_text(scene: Any) -> str:
     """Describe the materials of a scene's diffracting surfaces, after "; "; "" without any."""
     found = (s.summary for shape in scene.shapes() for s in surfaces_within(shape.bsdf()))
     first, rest = (texts := list(dict.fromkeys(found)))[:_MOST_SURFACES], texts[_MOST_SURFACES:]
-    more = [f"{len(rest)} more materials"] if rest else []
+    more = [counted(len(rest), "more material")] if rest else []
     return "".join(f"; {text}" for text in (*first, *more))
 
 

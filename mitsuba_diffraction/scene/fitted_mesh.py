@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from ..arrays import Real
-from ..errors import DiffractionError, check_choice
+from ..errors import DiffractionError, check_choice, counted
 from .orientation.directions import direction_field
 from .orientation.interchange import stated_up
 from .orientation.mesh_files import MeshFile
@@ -75,7 +75,8 @@ def fit_of(positions: Real, file: Path, up: str = "auto") -> MeshPlacement:
     lost = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if len(lost):
         raise DiffractionError(
-            f"mesh '{file}': vertex {lost[0]} is not finite ({len(lost)} such vertices); "
+            f"mesh '{file}': vertex {lost[0]} is not finite "
+            f"({counted(len(lost), 'such vertex', 'such vertices')}); "
             "repair the mesh"
         )
     sides = np.ptp(positions, axis=0)

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, warn
+from ..errors import DiffractionError, counted, warn
 from ..extras import optional
 from ..files import refuse_pipe
 from ..progress import Progress
 from .denoise import denoised
-from .load import load_scene, preview_samples, sensor_of
+from .load import check_values, load_scene, preview_samples, sensor_of
 from .parameters import files_of
 from .passes import Stop, render_passes
 from .pictures import colours_of, count_bad, write_exr, write_png
@@ -65,6 +65,25 @@ class Frame:
             if old != new:
                 return name, "it changed" if name == "scene" else f"it was {old} and is {new}"
         return ("EXR", "it is missing") if with_exr and not self.exr.exists() else None
+
+
+def check_frames(scene: Path, frames: Sequence[Frame]) -> None:
+    """Refuse values of later frames before the first is rendered, in the variant that is set.
+
+    The scene is parsed with the values of each frame, and loaded with those of the last: allowed
+    values are intervals, which hold all values between two that they hold.
+
+    Raises a DiffractionError that names the frame.
+    """
+    for frame in frames[1:]:
+        try:
+            if frame is frames[-1]:
+                load_scene(scene, frame.values)
+            else:
+                check_values(scene, frame.values)
+        except DiffractionError as error:
+            load_scene(scene, frames[0].values)  # its own error, if it is that of all frames
+            raise DiffractionError(f"{frame.png.stem}: {error}") from error
 
 
 def render_frames(
@@ -130,7 +149,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
         )
     bad = count_bad(bitmap)
     if bad:
-        warn(f"{frame.png}: {bad} pixels are not finite and black")
+        warn(f"{frame.png}: {counted(bad, 'pixel')} not finite, and black")
     frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
     if with_exr:
         write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": variant})

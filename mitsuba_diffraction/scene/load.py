@@ -148,6 +148,26 @@ def load_scene(
     return scene
 
 
+def check_values(file: Path, parameters: Mapping[str, Any]) -> None:
+    """Refuse values that Mitsuba cannot parse, such as a fraction for a whole number.
+
+    The variant is set, and the scene's parameters have these names.
+
+    Raises a DiffractionError with the parameter's place in the scene.
+    """
+    import mitsuba as mi
+
+    from .additions import split_values
+
+    values = split_values(parameters, parameters_of(file, parameters) or {})
+    config = mi.parser.ParserConfig(mi.variant())
+    try:
+        with _files_beside(file):
+            mi.parser.parse_file(config, str(file), **values.parameters)
+    except RuntimeError as error:
+        raise error_of("cannot load the scene", error) from error
+
+
 def _check_parameters_act(
     file: Path, values: SceneValues, defaults: Mapping[str, str | None]
 ) -> None:
@@ -337,6 +357,11 @@ def _check_films(state: Any) -> None:
         )
         if not isinstance(width, int) or not isinstance(height, int):
             continue  # Mitsuba names the type that it expects
+        if width * height == 0:
+            raise DiffractionError(
+                f"a picture of {width} x {height} pixels has none; give a width and a height of at "
+                "least 1 (resx, resy of most scenes)"
+            )
         needed = width * height * _BYTES_PER_PIXEL
         if needed > memory():
             raise DiffractionError(

@@ -15,7 +15,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, counted
 from ..files import FileKind, kind_of
 from ..optics.materials import lets_light_through
 from ..orders.file import load_orders
@@ -60,7 +60,7 @@ class Edit:
         """
         names = [own_id(name) or "one without id" for name in self.shapes]
         listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
-        count = f"{len(names)} shape{'s' if len(names) > 1 else ''}"
+        count = counted(len(names), "shape")
         found = [s for shape in scene.shapes() if shape.id() in self.shapes
                  for s in surfaces_within(shape.bsdf())]  # fmt: skip
         materials = dict.fromkeys(_material(surface) for surface in found)

@@ -130,7 +130,7 @@ def test_the_command_writes_the_folder(run, scans, tmp_path):
         "--coherence-width", 6, "--tolerance", 0.05, "--resolution", 24,
     )  # fmt: skip
     assert ran.code == 1
-    assert "1 scans in survey.csv, 2 failed, 3 samples" in ran.out
+    assert "1 scan in survey.csv, 2 failed, 3 samples" in ran.out
     assert "none.npy" in ran.err
     assert "uncertain by some 15 %" in ran.err
 

@@ -12,8 +12,11 @@ import sys
 import termios
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mitsuba_diffraction.cli import interrupt
+from mitsuba_diffraction.heights.source import Source
 from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
@@ -46,6 +49,14 @@ Source.of = read
 """
 
 
+# The signals reach another thread, so that the sleep is not cut short.
+HELD = "import mitsuba_diffraction.cli.interrupt as i; i.GRACE = 0.2\n" + STUCK.replace(
+    'print("stuck", flush=True)',
+    "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM]); "
+    'print("stuck", flush=True)',
+)
+
+
 @pytest.mark.parametrize("columns", [0, 40, 200])
 def test_a_bar_is_redrawn_in_one_line(columns):
     ours, its = pty.openpty()
@@ -59,9 +70,9 @@ def test_a_bar_is_redrawn_in_one_line(columns):
     assert max(map(len, drawn)) <= (columns or 80)
 
 
-def started(code: str, folder: Path) -> subprocess.Popen[str]:
+def started(code: str, folder: Path, *words: str) -> subprocess.Popen[str]:
     lines = ["import signal, sys", "from mitsuba_diffraction.cli import main", code]
-    lines += ["sys.exit(main(['info', 'x']))"]
+    lines += [f"sys.exit(main({words or ('info', 'x')}))"]
     return subprocess.Popen(
         [sys.executable, "-c", "\n".join(lines)], cwd=folder, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)},
@@ -70,13 +81,7 @@ def started(code: str, folder: Path) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_what_holds_the_main_thread(tmp_path, number, code):
-    held = "import mitsuba_diffraction.cli.interrupt as i; i.GRACE = 0.2\n" + STUCK.replace(
-        "ctypes.CDLL(None).sleep(600)",
-        # the signals reach another thread, so that the sleep is not cut short
-        "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM]); "
-        "ctypes.CDLL(None).sleep(600)",
-    )
-    process = started(held, tmp_path)
+    process = started(HELD, tmp_path)
     assert process.stdout is not None
     process.stdout.readline()
     assert len(os.listdir(tmp_path)) == 1  # the temporary file
@@ -85,6 +90,35 @@ def test_a_signal_ends_what_holds_the_main_thread(tmp_path, number, code):
     assert process.returncode == code
     assert said.count("\n") == (1 if number == signal.SIGINT else 0), said
     assert os.listdir(tmp_path) == []
+
+
+def test_a_survey_says_where_it_goes_on_whatever_holds_the_main_thread(tmp_path):
+    np.save(tmp_path / "scan.npy", np.eye(16))
+    held = HELD.replace("Source.of = read", "import mitsuba_diffraction.analysis.survey as survey")
+    held += "survey.measure = read"
+    process = started(held, tmp_path, "survey", "scan.npy", "--pixel-size", "0.1")
+    assert process.stdout is not None
+    process.stdout.readline()
+    for _ in range(2):
+        process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=SOON)
+    assert process.returncode == 130
+    assert "finished scans are in 'survey': run the command again to go on" in said
+
+
+def test_a_second_ctrl_c_does_not_cut_the_last_line_short(run, monkeypatch):
+    said = interrupt.say
+
+    def say(text):
+        signal.raise_signal(signal.SIGINT)
+        said(text)
+
+    monkeypatch.setattr(interrupt, "say", say)
+    monkeypatch.setattr(Source, "of", lambda *_: signal.raise_signal(signal.SIGINT))
+    ran = run("info", "x")
+    assert ran.code == 130
+    assert ran.err == "mitsuba-diffraction: interrupted; no half-written file was left behind\n"
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 # one of the first that the package imports, and of the last

@@ -26,6 +26,14 @@ def test_a_height_field_is_described(run, heights):
         assert part in ran.out
 
 
+def test_pixels_and_extent_are_along_x_and_y(run, here):
+    np.save(here / "wide.npy", np.eye(10, 40))
+    out = run("info", "wide.npy", "--pixel-size", "0.1").out
+    lines = dict(line.split(":", 1) for line in out.splitlines() if ":" in line)
+    assert lines["pixels"].strip() == "40 x 10"
+    assert lines["extent"].strip() == "4 x 1 µm"
+
+
 def test_json_has_the_numbers(run, heights):
     data = json.loads(run("info", heights, "--pixel-size", "0.08", "--json").out)
     assert data["kind"] == "height field"

@@ -135,6 +135,28 @@ def test_ctrl_c_exits_with_130(run, command):
     ]
 
 
+def test_ctrl_c_while_options_are_parsed_exits_with_130(run, monkeypatch):
+    module = sys.modules["mitsuba_diffraction.cli.main"]  # the room has a function of this name
+    monkeypatch.setattr(module, "build_parser", raising(KeyboardInterrupt()))
+    ran = run("info", "x")
+    assert ran.code == 130
+    assert ran.err.startswith("mitsuba-diffraction: interrupted; ")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("kind", [SystemError, ImportError])
+def test_ctrl_c_within_the_import_of_an_extension_exits_with_130(run, command, kind):
+    """Python and nanobind make errors of their own of it."""
+
+    def action():
+        raise kind("Encountered an error while initializing") from KeyboardInterrupt()
+
+    ran = run(*command(action))
+    assert ran.code == 130
+    assert "unexpected" not in ran.err
+    assert f"unexpected {kind.__name__}" in run(*command(raising(kind("own")))).err
+
+
 def test_a_warning_is_one_line_and_said_once(run, command):
     def action():
         for _ in range(2):

@@ -49,10 +49,9 @@ def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypat
     lines = (tmp_path / "grating-spectrum.csv").read_text().split()
     first, last = (float(lines[n].partition(",")[0]) for n in (1, -1))
     assert 420 <= first < last <= 680
-    part = run("spectrum", "grating.nc", "--wavelength-range", "300:900", "--step", 100)
-    assert "500 to 600 nm, which every table has" in part.err.replace("\n", " ")
-    refused = run("spectrum", "grating.nc", "--wavelength-range", "300:400")
-    assert "420 to 680 nm" in refused.err
+    for wanted in ("300:900", "300:400"):
+        refused = run("spectrum", "grating.nc", "--wavelength-range", wanted, "--step", 100)
+        assert "420 to 680 nm" in refused.failed_in_one_line()
 
 
 def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
@@ -115,7 +114,7 @@ def test_a_crossed_grating_is_solved(run, tmp_path, monkeypatch):
     flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500:500", "--resolution", 3)
     light = ("--theta", "0,60", "--polarised")
     solved = run("solve", "flat.npy", *flags, *light, "-o", "flat.nc")
-    assert "1 orders" in solved.out
+    assert "1 order, " in solved.out
     run("orders", "flat.nc", "--theta", 60, "--polarised", "-o", "flat.csv")
     s, p = np.loadtxt("flat.csv", delimiter=",", skiprows=1)[-2:].tolist()
     inside = np.sqrt(1.5**2 - 0.75)

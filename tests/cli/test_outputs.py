@@ -93,6 +93,15 @@ def test_an_output_among_scans_that_a_second_run_would_read_is_refused(run, worl
     assert os.listdir("scans") == ["h.npy"]
 
 
+def test_a_survey_goes_on_in_its_folder_that_the_shell_names_among_the_scans(run, world):
+    """As `survey *` does the second time."""
+    for _ in range(2):
+        names = [name for name in sorted(os.listdir()) if name in ("h.npy", "survey")]
+        ran = run("survey", *names, *shlex.split(HEIGHTS), "--resolution", "8")
+        assert ran.code == 0, ran.err
+    assert "survey/survey.csv" in ran.err
+
+
 @pytest.mark.parametrize(
     "command", ["survey nothere", "spectrum nothere", "spectrum --group a=h.npy --group b=nothere"]
 )

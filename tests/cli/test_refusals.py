@@ -99,7 +99,7 @@ REFUSED = {
     },
     f"sweep terms {_SWEEP}": {
         "--coherence-width 1e300": "coherence_width",
-        "--values a": "--values: expected numbers, got 'a'",
+        "--values a": "--values: expected numbers, blanks between, got 'a'",
         "--method nmm": "needs method 'flss'",
     },
     f"sweep light-angle {_SWEEP}": {"--values 95": "theta=95 must be"},
@@ -163,7 +163,10 @@ REFUSED = {
         command: {"groove.toml": "run the command 'solve groove.toml'"}
         for command in ("precompute ", "info ", "brdf-map ", "evaluate ", "spectrum ")
     },
-    "plan scale.xml": {"-D widht=3": "did you mean width?"},
+    "plan scale.xml": {
+        "-D widht=3": "did you mean width?",
+        "-D width=0": "a picture of 0 x 4 pixels has none",
+    },
     "hologram": {
         "red.png": "no colour beside its ground",
         "none.png": "'none.png' does not exist",
@@ -206,12 +209,15 @@ REFUSED = {
         "--observer dog --illuminant leafs -m scalar_spectral": "did you mean leaves?)",
     },
     _FRAMES: {
+        "--turn nowhere": "error: 'room.xml' has no parameter 'nowhere'; it has",
         "--turn format": "the turn of format begins at 'rgb', which is not an angle",
         "--animate ssp=0:1": "did you mean spp?",
     },
     "render": {
         "none.xml": "none.xml",
         "empty": "is a folder",
+        "grating.npy": "'grating.npy' (array) is neither a scene (XML) nor a mesh",
+        "recipe.toml": "'recipe.toml' (recipe) is neither a scene (XML) nor a mesh",
         "room.xml --plan no.toml -o a.exr": "no.toml' does not exist",
     },
 }

@@ -67,6 +67,51 @@ def test_the_table_serves_the_heights_that_are_asked_for(run, scans, asked):
     assert agrees is (asked[0] == "--height-scale")
 
 
+@pytest.mark.parametrize("file", ["orders.nc", "t.exr"])
+def test_wavelengths_that_a_table_lacks_are_refused_if_they_were_asked_for(run, world, file):
+    """Of the default range they are left out, in one line: of both kinds of tables."""
+    how = ["--light", "10", "--detector", "0", "--step", "50", "-o", "out.csv"]
+    ran = run("spectrum", file, *how)
+    assert ran.code == 0, ran.err
+    assert ran.err.count(": other wavelengths are left out") == 1
+    (world / "out.csv").unlink()
+    line = run("spectrum", file, *how, "--wavelength-range", "310:650").failed_in_one_line()
+    assert f"'{file}' has light from " in line
+    assert "and the wavelengths are " in line
+    assert not (world / "out.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("heights", "pixel", "said"),
+    [(np.eye(8), 0.05, "is narrower than two wavelengths and has no colours"),
+     (1e-6 * np.eye(64), 0.05, "multiply the heights by 1e6 if they are in metres"),
+     (0.1 * np.eye(16), 50, "is the pixel size of 50 µm in nm?")],
+    ids=["eight pixels", "metres", "nanometres"],
+)  # fmt: skip
+def test_scans_without_colours_and_in_other_units_are_said_in_full(run, here, heights, pixel, said):
+    """Not as one of some notes that `info` prints."""
+    np.save(here / "a.npy", heights)
+    ran = run("spectrum", "a.npy", "--pixel-size", pixel, "--step", "200")
+    assert ran.code == 0, ran.err
+    assert said in ran.err
+
+
+@pytest.mark.parametrize("command", ["spectrum", "survey"])
+def test_results_of_an_earlier_run_beside_the_scans_are_left_out(run, scans, monkeypatch, command):
+    """As a shell names them for `spectrum *`, and in a folder."""
+    monkeypatch.chdir(scans)
+    for words in (["scan0.npy", "--observer", "dog"], ["--group", "a=scan?.npy"]):
+        assert run("spectrum", *words, *PIXEL, *QUICK[:2], "--step", "50").code == 0
+    results = sorted(name for name in os.listdir() if not name.endswith(".npy"))
+    assert len(results) == 9, results
+    for n, names in enumerate([sorted(os.listdir()), ["."]]):
+        ran = run(command, *names, *PIXEL, *QUICK[:2], "-o", scans.parent / f"{n}.csv")
+        assert ran.code == 0, ran.err
+        assert all(name in ran.err for name in results)
+    line = run(command, *results[:2], *PIXEL, "-o", scans.parent / "b.csv").failed_in_one_line()
+    assert f"'{results[0]}' is a plot or table of results, and no scan" in line
+
+
 def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
     ran = run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv")
     assert ran.code == 0, ran.err

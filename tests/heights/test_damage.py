@@ -34,6 +34,14 @@ def test_an_aborted_scan_is_named_with_what_is_left(rows, named, level):
     assert damage(scan(aborted).treated(level=level, crop=crop)) == []
 
 
+def test_rows_that_filled_a_rim_are_not_a_stuck_scanner(tmp_path):
+    rim = ROUGH.copy()
+    rim[:6] = rim[-6:] = np.nan
+    np.save(tmp_path / "rim.npy", rim)
+    field = HeightField.load(tmp_path / "rim.npy", pixel_size=0.05, fill="nearest")
+    assert not any("stuck" in line for line in damage(field))
+
+
 def test_repeated_rows_are_counted():
     stuck = ROUGH.copy()
     stuck[60:66] = stuck[59]

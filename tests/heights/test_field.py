@@ -140,6 +140,13 @@ def test_unusable_heights_are_refused(heights, word):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("flag", ["periodic", "cut_out"])
+def test_words_for_flags_are_refused(flag):
+    """`HeightField.load` takes words, of which "open" would be true here."""
+    with pytest.raises(DiffractionError, match=f"{flag}='open' must be True or False"):
+        HeightField(np.eye(4), 0.1, **{flag: "open"})
+
+
 def test_absurd_sizes_are_refused_without_memory():
     huge = np.broadcast_to(np.zeros(1), (2**20, 2**20))
     with pytest.raises(DiffractionError, match=str(MOST_PIXELS)):

@@ -238,6 +238,7 @@ def test_files_that_are_not_there_or_not_heights(some_variant, tmp_path):
     text = refusal(loads(filename="none.exr"))
     assert "filename: 'none.exr' does not exist; looked for it in '" in text
     assert repr(str(Path.cwd())) in text
+    assert "filename is empty; name a file" in refusal(loads(filename=""))
 
 
 def test_an_image_needs_its_lengths(some_variant, png):

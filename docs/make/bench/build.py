@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
-import os
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from unittest import mock
 
 import numpy as np
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.analysis.timing import PIXEL
-from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.orders.solve import jobs
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.system import peak_memory
 
@@ -99,23 +94,9 @@ def _heights(side: int, folder: Path) -> Path:
 
 @contextlib.contextmanager
 def new_process() -> Iterator[Callable[..., Any]]:
-    """Yield a function that calls others in one new process.
-
-    That has one thread for linear algebra, as commands have.
-    """
-    threads = {"OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "1")}
-    with (
-        mock.patch.dict(os.environ, threads),
-        ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as executor,
-    ):
-
-        def call(work: Callable[..., Any], *arguments: Any) -> Any:
-            try:
-                return executor.submit(work, *arguments).result()
-            except BrokenProcessPool as error:
-                raise DiffractionError(f"a child process of the bench failed: {error}") from error
-
-        yield call
+    """Yield a function that calls others in one new process."""
+    with jobs.processes(1) as executor:
+        yield lambda work, *arguments: executor.submit(work, *arguments).result()
 
 
 def _build(heights: Path, arguments: dict[str, Any]) -> dict[str, Any]:

@@ -12,8 +12,6 @@ import argparse
 import statistics
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +19,7 @@ import numpy as np
 
 from mitsuba_diffraction.cluster import FrameRequest, FrameSequence, connect
 from mitsuba_diffraction.errors import warn
+from mitsuba_diffraction.orders.solve import jobs
 from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.scene import Stop, load_scene, render_passes, set_variant
 
@@ -101,7 +100,7 @@ class FilmTimes(NamedTuple):
 
 def film_times(scene: Path) -> FilmTimes:
     """Render the film by turns in one process and on two workers."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as alone, connect(2) as client:
+    with jobs.processes(1) as alone, connect(2) as client:
 
         def turn(frames: int) -> tuple[Times, Times]:
             single = alone.submit(in_one_process, scene, frames).result()

@@ -11,19 +11,18 @@ from __future__ import annotations
 import argparse
 import datetime
 import itertools
-import multiprocessing
-import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-from unittest import mock
 
 import numpy as np
 
 from docs.make.figures.pages import option, program, progress_option
 from mitsuba_diffraction.cli import Bar, check_outputs
+from mitsuba_diffraction.orders.solve import jobs
+from mitsuba_diffraction.system import cores
 
 from . import coated, coupled_wave, crossed, filmed, integral, rayleigh
 from .cases import (
@@ -110,10 +109,6 @@ def solve_case(
     return solved
 
 
-#: Threads of one process: BLAS in each would fight the others for the processors.
-_ONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
-
 def _jobs(text: str) -> int:
     try:
         count = int(text)
@@ -139,13 +134,8 @@ def main(args: argparse.Namespace) -> None:
     # neighbours differ in their media alone, and share the solution of the surface
     cases = [case for same in zip(*work.values(), strict=True) for case in same]
     solved: list[Solved] = []
-    # Children start anew: what they inherit of BLAS's threads could not be changed
-    with (
-        Bar(args, unit=" cases") as bar,
-        mock.patch.dict(os.environ, _ONE),
-        multiprocessing.get_context("spawn").Pool(args.jobs) as pool,
-    ):
-        for each in pool.imap(partial(solve_case, solver=solver), cases, len(work)):
+    with Bar(args, unit=" cases") as bar, jobs.processes(args.jobs or cores()) as pool:
+        for each in pool.map(partial(solve_case, solver=solver), cases, chunksize=len(work)):
             solved.append(each)
             bar(len(solved), len(cases), f"solving {args.name}")
     for n, (file, path) in enumerate(paths.items()):

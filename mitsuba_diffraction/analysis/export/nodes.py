@@ -113,6 +113,8 @@ class Nodes:
     directions : function of ωi (3,), p and q that returns unit vectors ωo (n, 3) and dω/(dp dq).
     place : function of ωi and ωo that returns p and q.
     spread : function of q that returns rad of ωo per unit of p and of q, at most.
+    deviation : function of q that returns rad of ωo from the mirror direction; None where q does
+        not tell.
     pole : whether the first q is one direction for all azimuths.
     cosine : whether values are f cosθo, in place of f.
     """
@@ -123,6 +125,7 @@ class Nodes:
     directions: Callable[[Real, Real, Real], tuple[Real, Real]]
     place: Callable[[Real, Real], tuple[Real, Real]]
     spread: Callable[[float], tuple[float, float]]
+    deviation: Callable[[float], float] | None = None
     pole: bool = False
     cosine: bool = False
 
@@ -155,21 +158,26 @@ class Nodes:
         entries = np.concatenate(weights), (np.concatenate(rows), columns)
         return csr_array(entries, shape=(self.count, len(p)))
 
-    def lattice(self, step: float) -> tuple[Real, Real, Real, Real]:
+    def lattice(self, step: float, others: float, reach: float) -> tuple[Real, Real, Real, Real]:
         """Return p and q at the middles of even parts, their areas, and numbers of 0 to 1.
 
-        step : largest distance of samples, rad. The numbers are even over any part of the lattice.
+        The numbers are even over any part of the lattice.
+
+        step, others : largest distance of samples up to `reach` from the mirror direction, and
+            beyond, rad.
         """
         low, high = self.ends
         edges = [low, *self.polar[(self.polar > low) & (self.polar < high)].tolist(), high]
         parts = []
         for first, last in itertools.pairwise(edges):
+            beyond = self.deviation is not None and self.deviation(first) > reach
             across, along = self.spread(last)
             meet = first == low and self.spread(low)[0] == 0.0
             along *= _FINER if meet else 1
             least = _LEAST[2 if meet else 1]
-            m = max(math.ceil(across * 2.0 * np.pi / self.azimuths / step), _LEAST[0])
-            m, n = m * self.azimuths, max(math.ceil(along * (last - first) / step), least)
+            size = others if beyond else step
+            m = max(math.ceil(across * 2.0 * np.pi / self.azimuths / size), _LEAST[0])
+            m, n = m * self.azimuths, max(math.ceil(along * (last - first) / size), least)
             i, j = (part.ravel() for part in np.meshgrid(np.arange(m), np.arange(n), indexing="ij"))
             widths = 2.0 * np.pi / m, (last - first) / n
             parts.append((
@@ -214,9 +222,15 @@ def laid(
     require_loaded_llvm()
     surface = FILES.described(bsdf)
     check_lit(surface, grid.wavelengths)
-    lobe = 1.0 / (math.sqrt(2.0) * surface.sigma * float(wavenumber(grid.wavelengths[0])))
+    shortest, longest = (float(wavenumber(grid.wavelengths[n])) for n in (0, -1))
+    lobe = 1.0 / (math.sqrt(2.0) * surface.sigma * shortest)
     solved = surface.solved and surface.nested is None and lobe < 0.5 * nodes.size
-    p, q, area, number = nodes.lattice(math.inf if solved else math.sqrt(2.0) * lobe)
+    # order 0 has the narrowest lobe; lobes of other orders are as wide as a scan's windows
+    wider = 1.0 if surface.solved else surface.coherence_width / surface.patch.window_width
+    step = math.inf if solved else math.sqrt(2.0) * lobe
+    # 4e-6 of a lobe is beyond five deviations, which are 1/cosθ times as long in the plane of light
+    reach = 5.0 * lobe * shortest / longest / math.cos(math.radians(grid.theta[-1]))
+    p, q, area, number = nodes.lattice(step, wider * step, reach)
     if len(p) > _MOST_SAMPLES:
         raise DiffractionError(
             f"coherence_width={surface.coherence_width:g} µm: lobes of {np.degrees(lobe):.2g}° are "

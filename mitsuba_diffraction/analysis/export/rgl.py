@@ -42,7 +42,8 @@ def save_rgl(
     theta, phi = np.radians(grid.theta), np.radians(grid.phi)
     nodes = Nodes(
         n - 1, np.linspace(0.0, 1.0, n), (0.0, 1.0), _directions, _place,
-        lambda u: (2.0 * np.sin(0.5 * np.pi * u * u), 2.0 * np.pi * u), pole=True, cosine=True,
+        lambda u: (2.0 * np.sin(0.5 * np.pi * u * u), 2.0 * np.pi * u), lambda u: np.pi * u * u,
+        pole=True, cosine=True,
     )  # fmt: skip
     spectra = np.empty((len(phi) * len(theta), len(grid.wavelengths), n, n), np.float32)
     powers = np.empty((len(phi) * len(theta), n, n))

@@ -41,7 +41,7 @@ def save_zemax(
     azimuths, radials = np.linspace(0.0, 360.0, _AZIMUTHS), np.linspace(0, _REACH, grid.resolution)
     nodes = Nodes(
         _AZIMUTHS - 1, np.radians(radials), (0.0, np.radians(_REACH)), _directions, _place,
-        lambda q: (np.sin(q), 1.0), pole=True,
+        lambda q: (np.sin(q), 1.0), lambda q: q, pole=True,
     )  # fmt: skip
     axes = grid.phi, grid.theta, azimuths, radials
     lines = [

@@ -7,11 +7,12 @@ import math
 import os
 import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...atomic import atomic_path
+from ...images import save_figure
 from ...tables import write_channels
 from .result import BrdfMap
 
@@ -209,8 +210,7 @@ def save_png(
     exposure : stops; by default `brdf_map.exposure()`.
     title, notes : see `figure`.
     """
-    with atomic_path(path) as temporary:
-        figure(brdf_map, exposure, title=title, notes=notes).savefig(temporary, format="png")
+    save_figure(Path(path), figure(brdf_map, exposure, title=title, notes=notes))
 
 
 def save_exr(

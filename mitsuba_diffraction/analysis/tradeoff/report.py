@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...atomic import atomic_path
 from ...columns import save_rows
 from ...errors import DiffractionError
+from ...images import save_figure
 from .accuracy import Depths, Spectral
 from .measuring import MeasuredSetting, rows
 
@@ -153,7 +153,7 @@ def draw_trade(results: Sequence[MeasuredSetting], path: Path, title: str) -> No
     for handle in legend.legend_handles:
         if handle is not None and hasattr(handle, "set_sizes"):
             handle.set_sizes([36.0])
-    _save(axes, path)
+    save_figure(path, axes.figure, dpi=130)
 
 
 def draw_depths(depths: Depths, path: Path) -> None:
@@ -168,7 +168,7 @@ def draw_depths(depths: Depths, path: Path) -> None:
     axes.set(ylabel="relative error of the orders (cut at 10)")
     axes.set_title("light of 380 nm, normal; a line that ends is refused from there on", fontsize=9)
     axes.legend(fontsize=7)
-    _save(axes, path)
+    save_figure(path, axes.figure, dpi=130)
 
 
 def _front(results: Sequence[MeasuredSetting]) -> list[MeasuredSetting]:
@@ -188,9 +188,3 @@ def _axes(height: float) -> Any:
     axes.set(xscale="log", yscale="log")
     axes.grid(alpha=0.3)
     return axes
-
-
-def _save(axes: Any, path: Path) -> None:
-    """Write the figure of the axes as PNG."""
-    with atomic_path(path) as temporary:
-        axes.figure.savefig(temporary, dpi=130, format="png")

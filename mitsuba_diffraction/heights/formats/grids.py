@@ -87,7 +87,8 @@ def read_text(path: Path) -> RawHeights:
     Heights are in µm unless a header line says "Value units: nm"; "Width: 10 µm" and
     "Height: 10 µm" give the size of the patch. Empty cells and "nan" are points without data.
     Three columns are x, y and height, which have to form a regular grid; a line of names above
-    them may give their units, µm without. Separators and decimal commas are as in `columns`.
+    them may give their units, µm without, and another order. Separators and decimal commas are as
+    in `columns`.
 
     Raises a DiffractionError if a cell is not a number, rows differ in length, or a unit is not a
     length.
@@ -114,9 +115,11 @@ def read_text(path: Path) -> RawHeights:
         )
     pixel_size: tuple[float, float] | None
     if points:
-        units = [_factor(u, shown) if u else 1.0 for u in table.units]
-        unit, stated = (units[2], table.units[2]) if table.units[2] else (unit, stated)
-        values, pixel_size = _from_points(values * [*units[:2], 1.0], shown)
+        order = table.order("xy")
+        x, y, height = (table.units[n] for n in order)
+        unit, stated = (_factor(height, shown), height) if height else (unit, stated)
+        units = [_factor(u, shown) if u else 1.0 for u in (x, y)]
+        values, pixel_size = _from_points(values[:, order] * [*units, 1.0], shown)
     else:
         pixel_size = (size[0] / nx, size[1] / ny) if size else None
     return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
@@ -175,8 +178,8 @@ def _from_points(
     heights (ny, nx), pixel size (dx, dy) in µm
     """
     uneven = DiffractionError(
-        f"{shown} has three columns, which are read as x, y and height, but its points do not "
-        "form a uniform grid; interpolate them to one first"
+        f"{shown} has three columns, which are read as x, y and height (a line of names may give "
+        "another order), but its points do not form a uniform grid; interpolate them to one first"
     )
     xs, ix = np.unique(points[:, 0], return_inverse=True)
     ys, iy = np.unique(points[:, 1], return_inverse=True)

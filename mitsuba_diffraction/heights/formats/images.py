@@ -14,7 +14,7 @@ import numpy.typing as npt
 import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, counted
 from ...files import read_bytes, tiff_tags
 from ...images import open_image
 from ...limits import check_content
@@ -175,7 +175,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
         names = [str(entry.name) for entry in header["channels"]]
         height, width = int(high[1] - low[1] + 1), int(high[0] - low[0] + 1)
         check_pixel_count(height, width, shown)
-        check_pixel_count(height * len(names), width, f"{shown}, {len(names)} channels")
+        check_pixel_count(height * len(names), width, f"{shown}, {counted(len(names), 'channel')}")
         check_content(8 * height * width * len(names), path.stat().st_size, shown)
         chosen = _choose_channel(names, channel, shown)
         with without_chatter(), OpenEXR.File(str(path), separate_channels=True) as file:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, toeplitz
 
 from ...arrays import Real
-from ...errors import DiffractionError
+from ...errors import DiffractionError, counted
 from .films import Slice, Structure
 from .profiles import Profile
 from .stations import LEAST_NORMAL, Station
@@ -91,7 +91,8 @@ class CoupledWaves:
     @property
     def name(self) -> str:
         """Name and settings."""
-        return f"coupled waves, {2 * self.harmonics + 1} harmonics, {len(self.layers)} layers"
+        layers = counted(len(self.layers), "layer")
+        return f"coupled waves, {2 * self.harmonics + 1} harmonics, {layers}"
 
     def amplitudes(self, station: Station) -> Numbers:
         """Return the amplitudes between all channels; see `stations.Solver`."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...arrays import Complex, Real
-from ...errors import DiffractionError, warn
+from ...errors import DiffractionError, counted, warn
 from ..response import orders_between
 from .coupled import Inner, Modes, modes, scattered
 from .grating_index import TabulatedIndex
@@ -54,7 +54,9 @@ class CrossedWaves:
     def name(self) -> str:
         """Name and settings."""
         along_x, along_y = (2 * last + 1 for last in self._last)
-        return f"coupled waves, {along_x} x {along_y} harmonics, {len(self._slices)} slices"
+        return (
+            f"coupled waves, {along_x} x {along_y} harmonics, {counted(len(self._slices), 'slice')}"
+        )
 
     def amplitudes(self, station: CrossedStation) -> Complex:
         """Return the amplitudes (1, orders, 2, orders, 2) between all orders that propagate.

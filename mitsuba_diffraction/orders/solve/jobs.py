@@ -311,8 +311,8 @@ def processes(count: int) -> Iterator[Executor]:
         yield pool
     except BrokenExecutor as error:
         raise DiffractionError(
-            "a process that solves was killed, maybe for lack of memory; use fewer of them, and "
-            "run the same command again, which resumes from the stored results"
+            "a process was killed, maybe for lack of memory; use fewer of them, and run the same "
+            "command again, which resumes from stored results"
         ) from error
     except BaseException:
         # Ctrl-C does not wait for stations in progress

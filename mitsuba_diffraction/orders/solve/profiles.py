@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Real
 from ...columns import read_columns
-from ...errors import DiffractionError, check_choice, quoted, warn
+from ...errors import DiffractionError, check_choice, counted, quoted, warn
 from ...files import FileKind, kind_of
 from ...heights.lengths import micrometres_of, number_between
 
@@ -205,7 +205,7 @@ GENERATORS: dict[str, Callable[..., Profile]] = {
 
 
 def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
-    """Read a line: two columns x and z in µm, or in the units that a header line names.
+    """Read a line: two columns x and z in µm, or in the units and order that a header line names.
 
     Raises a DiffractionError if the file cannot be read, a line has no two numbers, or the line is
     no `Profile`, or less than half a period.
@@ -221,13 +221,15 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
         raise DiffractionError(f"'{path}' has no points; expected {what}")
     if table.numbers.shape[1] != 2:
         raise DiffractionError(
-            f"'{path}', line {table.lines[0]}: {table.numbers.shape[1]} numbers; expected {what}"
+            f"'{path}', line {table.lines[0]}: {counted(table.numbers.shape[1], 'number')}; "
+            f"expected {what}"
         )
     factors = [micrometres_of(unit) if unit else 1.0 for unit in table.units]
     if None in factors:
         unit = table.units[factors.index(None)]
         raise DiffractionError(f"'{path}': {quoted(unit)} is not a unit of length; expected µm, nm")
-    x, z = (table.finite((0, 1), what) * np.array(factors, np.float64)).T
+    lengths = table.finite((0, 1), what) * np.array(factors, np.float64)
+    x, z = lengths[:, table.order("x")].T
     x = x - x.min()
     if len(x) > 2 and x.max() < 0.5 * period:
         raise DiffractionError(

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...atomic import atomic_path
+from ...errors import counted
+from ...images import save_figure
 from ...optics.colour import delta_e, encode_srgb
 from .measures import Difference, Image
 
@@ -66,8 +67,7 @@ def write_sheet(
     figure.colorbar(shown, ax=axes[1, 0], label="ΔE2000", extend="max", shrink=0.8)
     for axis in axes.ravel():
         axis.set_axis_off()
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format=path.suffix.lower().lstrip("."))
+    save_figure(path, figure)
 
 
 def markdown(document: dict[str, Any]) -> str:
@@ -89,9 +89,9 @@ def markdown(document: dict[str, Any]) -> str:
         *(_row(method, entry, of_first) for method, entry in methods.items()),
         "",
         f"All {width} × {height} pixels in all direct light, {document['frames']} frames of "
-        f"{samples} samples a pixel, against {document['spp']} of the path tracer, whose noise is "
-        f"ΔE2000 {plain_number(document['noise']['delta_e_mean'])}; {document['driver']}; "
-        f"{100 * document['clipped']:.1f} % of the pixels are clipped.",
+        f"{counted(samples, 'sample')} a pixel, against {document['spp']} of the path tracer, "
+        f"whose noise is ΔE2000 {plain_number(document['noise']['delta_e_mean'])}; "
+        f"{document['driver']}; {100 * document['clipped']:.1f} % of the pixels are clipped.",
     ]
     if dark:
         lines += [

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import DiffractionError, warn
-from ...progress import Progress, silent
+from ...progress import Progress, Stages, silent
 from ...scene.passes import Stop, render_passes
 from ...scene.pictures import write_exr
 from ..glsl.renderer import Renderer
@@ -85,6 +85,7 @@ class Comparison:
     seed: int = 0
     progress: Progress = silent
     renderer: Renderer = field(init=False)
+    _stages: Stages = field(init=False, repr=False)
     _progressive: dict[tuple[str, int, bool], ProgressivePicture] = field(
         init=False, repr=False, default_factory=dict
     )
@@ -106,6 +107,9 @@ class Comparison:
         """
         supported = [name for name in dict.fromkeys(methods) if self._supports(name, leave_out)]
         camera, full = self.renderer.camera, None
+        drawn = {each for method in supported for each in self._drawn(method)}
+        # two halves of direct light, full transport, and the times of fragments
+        self._stages = Stages(self.progress, 2 + bool(self.full_spp) + len(drawn) + 1)
         with Stop() as stop:
             direct = self._halves(direct_light(self.scene, camera), stop)
             if self.full_spp:
@@ -117,7 +121,7 @@ class Comparison:
         if full is not None:
             self._write(full, "full", self.full_spp)
         table = {method: self._compare(method, direct, full) for method in supported}
-        self.progress(0, 1, "timing fragments")
+        self._stages.next()(0, 1, "timing fragments")
         for method, seconds in fragment_times(self.renderer, supported).items():
             table[method]["fragment_ns"] = 1e9 * seconds
         return {
@@ -145,9 +149,19 @@ class Comparison:
             return False
         return True
 
+    def _frames_of(self, method: str) -> int:
+        """Return the number of frames that a method draws."""
+        return self.frames if method == _QUICK else max(self.frames // _SPARED // 4 * 4, 4)
+
+    def _drawn(self, method: str) -> set[tuple[str, int, bool]]:
+        """Return the pictures of `_draw_progressive` for the comparison of a method."""
+        frames = self._frames_of(method)
+        drawn = {(method, frames, False), (_QUICK, frames, False), (_QUICK, self.frames, False)}
+        return drawn | ({(method, frames, True)} if self.full_spp else set())
+
     def _compare(self, method: str, direct: Halves, full: Any) -> dict[str, Any]:
         """Compare all pixels in progressive light with direct light and with full transport."""
-        frames = self.frames if method == _QUICK else max(self.frames // _SPARED // 4 * 4, 4)
+        frames = self._frames_of(method)
         picture, side, seconds = self._draw_progressive(method, frames)
         if method != _QUICK:
             many, few = (self._draw_progressive(_QUICK, n)[0] for n in (self.frames, frames))
@@ -192,10 +206,10 @@ class Comparison:
         clock = renderer.clock
         light.advance(2)  # compiles
         light.restart()
-        halves, start = [], clock()
+        halves, start, progress = [], clock(), self._stages.next()
         for half in range(2):
             for done in range(0, frames // 2, _STEP):
-                self.progress(half * frames // 2 + done, frames, f"lighting {method}")
+                progress(half * frames // 2 + done, frames, f"lighting {method}")
                 light.advance(min(_STEP, frames // 2 - done))
             parts = light.image[..., :3].reshape(height, side, width, side, 3)
             halves.append(parts.mean(axis=(1, 3), dtype=np.float64))
@@ -214,7 +228,7 @@ class Comparison:
         """Path-trace a picture (height, width, 3)."""
         result = render_passes(
             scene, sensor, spp=spp, seed=seed, variant=self.variant, stop=stop,
-            progress=self.progress,
+            progress=self._stages.next(),
         )  # fmt: skip
         if result.interrupted:
             raise KeyboardInterrupt

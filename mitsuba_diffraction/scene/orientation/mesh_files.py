@@ -24,6 +24,8 @@ from .mesh_indices import CODES, Element, any_line_begins, check_mesh, parsed_he
 from .trimesh import TriangleMesh, vertex_normals
 
 # Mitsuba's exceptions, text that is not UTF-8, and sizes beyond the memory
+# What Mitsuba says before the mistake: places in its sources, its plugins, and the file
+_LOADING = re.compile(r'^.*(?:Error while loading \w+ file "[^"]*"|plugin of type "\w+"): ')
 _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
@@ -132,9 +134,10 @@ def _load(file: Path) -> mi.Mesh:
                 check_mesh(cut, kind, shown=f"mesh '{file}'")
                 with contextlib.suppress(*_UNREAD):
                     return _read(cut, kind)
-        lines = str(error).split(": ", 1)[-1].split()
-        reason = " ".join(lines)[-200:] or type(error).__name__
-        raise DiffractionError(f"mesh '{file}': cannot be read: {reason}") from error
+        reason = _LOADING.sub("", " ".join(str(error).split())).rstrip("!. ")[-200:]
+        raise DiffractionError(
+            f"mesh '{file}': cannot be read: {reason or type(error).__name__}; export it again"
+        ) from error
 
 
 def _read(file: Path, kind: str) -> mi.Mesh:

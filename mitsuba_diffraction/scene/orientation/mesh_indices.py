@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError, quoted
+from ...errors import DiffractionError, counted, quoted
 from ...limits import check_content
 
 #: NumPy's codes of the types of a PLY file.
@@ -156,7 +156,8 @@ def _check_ply(file: Path, shown: str) -> int | None:
     if header.size + least > file.stat().st_size + 1:  # a text needs no blank at its end
         raise DiffractionError(
             f"{shown}: its {file.stat().st_size} bytes are fewer than its header states "
-            f"({counts['vertex']} vertices, {counts['face']} faces); export the mesh again"
+            f"({counts['vertex']} vertices, {counted(counts['face'], 'face')}); export the mesh "
+            "again"
         )
     rows = _faces(file, header, shown)
     if rows is None:

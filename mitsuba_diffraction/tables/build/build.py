@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError, warn
+from ...errors import DiffractionError, quoted, warn
 from ...heights import HeightField, units_warning
 from ...heights.coherence import resolved
 from ...optics.geometry import sigma_of
@@ -231,7 +231,12 @@ def build_with(
 
     run : what does the work of windows, as `map` does here.
     """
-    scans = [heights] if isinstance(heights, HeightField) else list(heights)
+    scans = [heights] if not isinstance(heights, Iterable) else list(heights)
+    if not all(isinstance(scan, HeightField) for scan in scans):
+        raise DiffractionError(
+            f"heights: expected a HeightField, or several, got {quoted(heights)}; HeightField.load "
+            "reads a file"
+        )
     settings = resolved(settings, scans)
     check_patches(scans, settings)
     screens = screens_of(scans, settings, run)

@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError
-from ...heights import HeightField
+from ...errors import DiffractionError, counted
+from ...heights.field import HeightField
 from ..expansion import Expansion, principal_functions
 from ..table import build_error
 from .error import FLOOR
@@ -98,9 +98,9 @@ def _fewest_intervals(
 def too_many_intervals(expansion: Expansion, terms: int, error: float) -> DiffractionError:
     """Error about a series that needs more intervals than make sense."""
     return build_error(
-        f"{expansion.intervals} intervals of κ with {terms} terms each still leave an "
-        f"error of {error:.2g} for heights of {2 * expansion.half_range:.3g} µm; give more terms "
-        "or a larger tolerance"
+        f"{counted(expansion.intervals, 'interval')} of κ with {counted(terms, 'term')} each "
+        f"still leave an error of {error:.2g} for heights of {2 * expansion.half_range:.3g} µm; "
+        "give more terms or a larger tolerance"
     )
 
 

@@ -14,7 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.analysis.export import rgl, scatter, zemax
+from mitsuba_diffraction.analysis.export import nodes, rgl, scatter, zemax
 from mitsuba_diffraction.analysis.export.nodes import ExportGrid
 from mitsuba_diffraction.columns import read_columns
 from mitsuba_diffraction.optics.colour import delta_e
@@ -264,6 +264,41 @@ def test_mirrors_and_narrow_lobes_keep_their_light_in_zemax_s_file(tmp_path):
             assert near(wo, power, theta) == pytest.approx(expected, rel=0.01)
     with pytest.raises(DiffractionError, match="expected one"):
         zemax.save_zemax(bsdf, tmp_path / "m.bsdf", scatter.DEFAULT)
+
+
+@pytest.mark.parametrize("name", ["rgl", "zemax"])
+def test_a_scan_s_light_is_laid_by_fewer_directions_far_from_its_narrow_order_0(
+    tmp_path, monkeypatch, name
+):
+    """Beside directions as close as order 0 has them everywhere, as if all lobes were so narrow."""
+    heights = 0.03 * np.random.default_rng(1).standard_normal((20, 20))
+    heights = np.kron(heights, np.ones((8, 8)))
+    scan = md.HeightField(heights, 0.05, periodic=False)
+    bsdf = mi.load_dict(md.bsdf_dict(scan, material="Al"))
+    grid = ExportGrid(np.array([5.0, 60.0]), np.array([-180.0, 180.0]), np.array([550.0]), 64)
+    counts, evaluated = [], nodes._evaluated
+
+    def counting(bsdf, wi, wo, *rest):
+        counts[-1] += len(wo)
+        return evaluated(bsdf, wi, wo, *rest)
+
+    monkeypatch.setattr(nodes, "_evaluated", counting)
+    module, files = {"rgl": rgl, "zemax": zemax}[name], []
+    for file in ("few", "many"):
+        counts.append(0)
+        getattr(module, f"save_{name}")(bsdf, tmp_path / file, grid)
+        monkeypatch.setattr(
+            md.DiffractionTable, "window_width", md.DiffractionTable.coherence_width
+        )
+        if name == "rgl":
+            files.append(mi.tensor_io.read(str(tmp_path / file))["spectra"])
+        else:
+            files.append(read_zemax(tmp_path / file)[3])
+    few, many = map(np.array, files)
+    assert counts[0] < counts[1] / 2
+    # 0.1 % is the aim of the lattice for each hat function, and so for its light
+    np.testing.assert_allclose(few, many, rtol=0.0, atol=1e-3 * many.max())
+    assert few.sum() == pytest.approx(many.sum(), rel=1e-3)
 
 
 def test_windows_too_wide_to_integrate_are_refused(tmp_path):

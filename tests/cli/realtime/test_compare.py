@@ -11,6 +11,7 @@ from PIL import Image
 
 from docs.make.figures import realtime
 from mitsuba_diffraction import DiffractionError, DiffractionTable, glsl, gratings
+from mitsuba_diffraction.cli.console import Bar
 from mitsuba_diffraction.scene import load_scene, passes
 
 pytestmark = pytest.mark.thorough
@@ -44,6 +45,24 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     file = tmp_path / "plate.xml"
     file.write_text(SCENE)
     return file
+
+
+@pytest.mark.parametrize("full", [0, 2])
+def test_progress_covers_all_of_the_work(run, scene, monkeypatch, some_variant, gl_works, full):
+    shares = []
+
+    def call(self, done, total, text):
+        if total:  # the scene's loading and the preparation of tables have no known length
+            shares.append((done / total, text))
+
+    monkeypatch.setattr(Bar, "__call__", call)
+    ran = run("compare", scene, "--method", "all", "-s", 4, "--full-spp", full, "--frames", 8)
+    assert ran.code == 0, ran
+    done = [share for share, _ in shares]
+    assert done == sorted(done)
+    stages = 3 + (full > 0) * 3 + 3  # direct light twice, `fast` of 8 and 4 frames, `exact`; times
+    assert shares[0][0] == 0.0
+    assert shares[-1] == ((stages - 1) / stages, "timing fragments")
 
 
 def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_works):

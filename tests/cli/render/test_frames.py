@@ -219,6 +219,21 @@ def test_a_preview_is_half_as_wide_and_quick(render):
     assert "3 samples" in render("--preview", "-s", "3", "-o", "a.png").out
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [("spp=2:3", "frame_0001: cannot load the scene: "), ("wide=16:-16", "frame_0002: ")],
+    ids=["a fraction between", "a size that is none at the end"],
+)
+def test_values_of_later_frames_are_refused_before_the_first_is_rendered(
+    render, scene, change, said
+):
+    wide = SCENE.replace('"width" value="16"', '"width" value="$wide"')
+    scene.write_text(wide.replace("<int", '<default name="wide" value="16"/><int', 1))
+    line = render("--frames", "3", "--animate", change, "-o", "out").failed_in_one_line()
+    assert said in line
+    assert os.listdir() == ["room.xml"]
+
+
 @pytest.mark.parametrize("option", ["--turn", "-D"])
 def test_what_the_scene_does_not_use_is_said_and_leaves_no_folder(render, scene, option):
     scene.write_text(SCENE.replace('"word"/>', '"word"/><default name="idle" value="3"/>'))

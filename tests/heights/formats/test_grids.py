@@ -70,6 +70,24 @@ def test_points_on_a_regular_grid_are_arranged(tmp_path):
     assert field.heights.tolist() == [[0, 1, 2, 3], [10, 11, 12, 13], [20, 21, 22, 23]]
 
 
+@pytest.mark.parametrize(
+    ("header", "order"),
+    [("z [um],x [um],y [um]", (2, 0, 1)), ("y_um,x_um,height_um", (1, 0, 2)), ("Y;X;H", (1, 0, 2)),
+     ("# height,y,x", (2, 1, 0)), ("a,b,c", (0, 1, 2))],
+)  # fmt: skip
+def test_columns_of_points_have_the_order_of_their_names(tmp_path, header, order):
+    points = np.array([(x * 0.5, y * 0.25, 10 * y + x) for y in range(3) for x in range(4)])
+    mark = ";" if ";" in header else ","
+    for name, columns in (("named.csv", order), ("plain.csv", (0, 1, 2))):
+        text = {"delimiter": mark, "comments": ""} | (
+            {"header": header} if columns is order else {}
+        )
+        np.savetxt(tmp_path / name, points[:, columns], **text)
+    named, plain = (HeightField.load(tmp_path / n) for n in ("named.csv", "plain.csv"))
+    assert named.pixel_size == plain.pixel_size
+    np.testing.assert_array_equal(named.heights, plain.heights)
+
+
 def test_each_column_of_points_has_its_own_unit(tmp_path):
     path = tmp_path / "a.txt"
     rows = [f"{1e3 * x:g} {0.5 * y:g} {100.0 * (x + y):g}" for y in range(2) for x in range(3)]

@@ -282,6 +282,18 @@ def test_a_tiff_is_turned_as_it_is_to_be_shown(tmp_path, orientation, shown):
     np.testing.assert_array_equal(found[::-1], shown(FLOATS))
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_a_turned_tiff_keeps_its_rows_whatever_its_pixels(tmp_path, dtype):
+    """Pillow 13 maps the first two kinds into memory, by the sides of the turned picture."""
+    levels = np.arange(6 * 4).reshape(6, 4)
+    path = tmp_path / "turned.tif"
+    Image.fromarray(levels.astype(dtype)).save(path, tiffinfo={274: 6})
+    heights = {} if dtype is np.float32 else {"max_height": 1e-3 * np.iinfo(dtype).max}
+    field = HeightField.load(path, pixel_size=0.1, level="none", **heights)
+    scale = 1.0 if dtype is np.float32 else 1e-3
+    np.testing.assert_allclose(field.heights[::-1], scale * np.rot90(levels, -1), atol=1e-9)
+
+
 @pytest.mark.parametrize("order", "<>")
 def test_doubles_of_a_tiff_are_read(tmp_path, order):
     heights = np.random.default_rng(2).random((5, 7))

@@ -207,8 +207,8 @@ def edited(lines, *changes):
         (lambda lines: edited(lines, (5, 1, "95")), "theta"),
         (lambda lines: edited(lines, (5, 3, "0.5")), "order"),
         (lambda lines: edited(lines, (5, 3, "1e9")), "order"),
-        (lambda lines: [*lines, "red\n"], "numbers where the first row has 6"),
-        (lambda lines: [*lines, "500,1\n"], "numbers where the first row has 6"),
+        (lambda lines: [*lines, "red\n"], "where the first row has 6"),
+        (lambda lines: [*lines, "500,1\n"], "where the first row has 6"),
         (lambda lines: [], "no lines"),
     ],
 )

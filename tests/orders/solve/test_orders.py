@@ -134,6 +134,14 @@ def test_a_line_is_read_with_its_undercut(tmp_path):
     assert (np.diff(profile.x) < 0).any()
 
 
+def test_columns_of_a_line_have_the_order_of_their_names(tmp_path):
+    """Depth and period are alike, so that no length tells which column is x."""
+    (tmp_path / "xz.csv").write_text("x,z\n0,0\n0.2,0.9\n0.6,0.3\n")
+    (tmp_path / "zx.csv").write_text("z_nm;x_nm\n0;0\n900;200\n300;600\n")
+    one, other = (read_profile(tmp_path / f"{name}.csv", 1.0) for name in ("xz", "zx"))
+    np.testing.assert_allclose([other.x, other.z], [one.x, one.z], atol=1e-12)
+
+
 def test_a_ridge_that_leans_over_the_next_period_is_moved():
     leaning = polygon([(0, 0), (0.5, 0), (0.9, 0.3), (1.2, 0.3), (0.9, 0)], 1.0)
     np.testing.assert_allclose(leaning.x, [0, 0.4, 0.7, 0.4, 0.5])

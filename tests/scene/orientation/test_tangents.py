@@ -227,6 +227,15 @@ def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
         load_mesh(tmp_path / "short.ply")
 
 
+def test_a_damaged_mesh_is_named_once_with_its_mistake(tmp_path):
+    file = tmp_path / "bad.obj"
+    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n")
+    with pytest.raises(DiffractionError) as caught:
+        load_mesh(file)
+    assert str(caught.value).count("bad.obj") == 1
+    assert "cannot be read: reference to invalid vertex 99; export it again" in str(caught.value)
+
+
 def report_of(positions, normals, faces, along, smoothing=0.03):
     """What is found on a mesh that `tangents` makes."""
     field = direction_field(positions, normals, faces, along, smoothing=smoothing)

@@ -20,6 +20,12 @@ from tests.support.patches import DEEP, DEFAULTS, PATCH
 pytestmark = pytest.mark.thorough
 
 
+@pytest.mark.parametrize("heights", ["scan.npy", [[0.0, 1.0]], 3.0])
+def test_what_is_no_height_field_is_refused(heights):
+    with pytest.raises(DiffractionError, match=r"HeightField\.load reads a file"):
+        DiffractionTable.build(heights)
+
+
 def refused(**arguments):
     """The one line with which a table of PATCH, or of heights=…, is refused."""
     heights = arguments.pop("heights", PATCH)
@@ -124,7 +130,7 @@ def test_what_a_wide_patch_is_advised_to_do_helps():
 
 def test_a_series_too_short_for_any_number_of_intervals_is_refused():
     text = refused(terms=1, tolerance=1e-5)
-    assert "intervals of κ with 1 terms each still leave an error of" in text
+    assert "intervals of κ with 1 term each still leave an error of" in text
     assert text.endswith("give more terms or a larger tolerance")
 
 
