@@ -250,7 +250,7 @@ class Diffraction(DiffractingSurface):
             partial(reflectors_of, self.boundary, self.coat),
             conserving=self.energy_conserving,
             beneath=nested is not None,
-            place=material.thickness.place
+            thickness=material.thickness
             if isinstance(material := self.boundary.material, UnderFilm)
             and material.thickness.texture
             else None,

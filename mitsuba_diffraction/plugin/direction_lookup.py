@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import drjit as dr
 import mitsuba as mi
@@ -17,8 +17,9 @@ from ..tables.directional import LAST_ANGLE, SHARE, DirectionalTable
 from .arithmetic import clip, float_of, index_of
 from .directions import Site
 from .energy_factors import ScaleRange
+from .layers import Thickness
 from .memory import index_between, read_record, upload
-from .types import Buffer, Float, Index, Interaction, Vector2f, Vector3f
+from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 #: First wavelength, end and step of integrals over daylight, nm.
 _DAYLIGHT = (360.0, 830.0, 2.0)
@@ -32,8 +33,10 @@ class DirectionLookup:
 
     Parameters
     ----------
-    tables : of one or two sides, at evenly spaced height scales, `nodes`.
-    place : function that returns another coordinate of `nodes` than the height scale, at hits.
+    tables : of one or two sides, at evenly spaced height scales, `nodes`; or at thicknesses.
+    thickness : of a film; `nodes` are thicknesses then, nm.
+    fringes : whether a value between wavelengths is that of the same fringe at both, of a film of
+        the same share of the wavelength. At the same thickness fringes would be missed.
     """
 
     def __init__(
@@ -41,10 +44,12 @@ class DirectionLookup:
         tables: Sequence[Sequence[DirectionalTable]],
         nodes: list[float],
         scales: ScaleRange,
-        place: Callable[[Interaction], Float] | None = None,
+        thickness: Thickness | None = None,
+        *,
+        fringes: bool = False,
     ) -> None:
-        height_scale, varies = scales.height_scale, scales.varies or place is not None
-        self._coordinate = place
+        height_scale, varies = scales.height_scale, scales.varies or thickness is not None
+        self._thickness, self._fringes = thickness, fringes and thickness is not None
         maps = np.stack([[_cells(side, scales.centre) for side in sides] for sides in tables])
         self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
@@ -61,17 +66,20 @@ class DirectionLookup:
         self._first = mi.Float(math.log2(float(wavenumber(wavelengths[0]))))
         octaves = math.log2(wavelengths[-1] / wavelengths[0])
         self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
-        dr.make_opaque(self._low, self._slope, self._first, self._pages_per_log)
+        self._logs_per_page = mi.Float(octaves / max(len(wavelengths) - 1, 1))
+        dr.make_opaque(
+            self._low, self._slope, self._first, self._pages_per_log, self._logs_per_page
+        )
 
     def at(self, direction: Vector3f, site: Site) -> list[Float]:
         """Return the value of each channel for a direction in the shading frame."""
         frame, wavenumbers = site.frame, site.wavenumbers
         cosine = mi.Frame3f.cos_theta(direction)
         tangential, share = frame.turned(direction), None
-        if self._coordinate is None:
+        if self._thickness is None:
             place = site.scale * dr.rcp(frame.stretch)
         else:
-            place = self._coordinate(site.si)
+            place = self._thickness.at(site.si, mi.Mask(True))
         if self._nodes is not None and (self._varies or dr.grad_enabled(place)):
             share = (place - self._low) * self._slope
         both = self._sides == 2
@@ -79,7 +87,7 @@ class DirectionLookup:
         if both:
             cell = dr.select(cosine > 0.0, cell, cell + self._polar * self._azimuthal)
 
-        def pages(n: Index) -> list[Float]:
+        def pages(n: Index, share: Float | None = share) -> list[Float]:
             corners = self._corners(cell * self._pages + n, share)
             fours = (corners[start : start + 4] for start in range(0, self._record, 4))
             return [dr.lerp(dr.lerp(a, b, t), dr.lerp(c, d, t), s) for a, b, c, d in fours]
@@ -89,9 +97,15 @@ class DirectionLookup:
             return [pages(mi.UInt32(min(n, last)))[0] for n in range(len(wavenumbers))]
         values = []
         for k in wavenumbers:
-            place = (self._first - dr.log2(k * frame.stretch)) * self._pages_per_log
-            n = index_of(index_between(place, 0.0, self._pages - 1.0))
-            values.append(dr.lerp(*pages(n), clip(place - float_of(n), 0.0, 1.0)))
+            at = (self._first - dr.log2(k * frame.stretch)) * self._pages_per_log
+            n = index_of(index_between(at, 0.0, self._pages - 1.0))
+            within = clip(at - float_of(n), 0.0, 1.0)
+            ends = pages(n)
+            if self._fringes:  # at thicknesses d λn/λ
+                ratios = [dr.exp2((end - within) * self._logs_per_page) for end in (0.0, 1.0)]
+                shares = [(place * ratio - self._low) * self._slope for ratio in ratios]
+                ends = [pages(n, share)[end] for end, share in enumerate(shares)]
+            values.append(dr.lerp(*ends, within))
         return values
 
     def _place(self, tangential: Vector2f, cosine: Float) -> tuple[Float, Float]:

@@ -24,14 +24,15 @@ from ..progress import show
 from ..tables import DiffractionTable
 from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy import conserved
-from ..tables.energy.conservation import Conservation, Energy
+from ..tables.energy.conservation import Conservation, Energy, albedo_wavelengths
 from .arithmetic import plain
 from .boundary import Boundary
 from .direction_lookup import DirectionLookup, at_horizon, between, ones_like, scales_of
 from .directions import Site
 from .energy_factors import ScaleRange
+from .layers import Thickness
 from .materials import Dielectric, IndexAt
-from .types import Colour, Float, Interaction, Vector3f
+from .types import Colour, Vector3f
 
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
 #: rarely and sees s and the albedo's excess as constants.
@@ -40,7 +41,7 @@ INDEX_STEP, COAT_STEP, DIELECTRIC_STEP = 0.05, 0.01, 0.002
 #: guides gains several times, within narrow fringes.
 FILM_PHASE = 0.02
 
-#: Material of a surface, or materials evenly along its `place`, from the factor on its lengths
+#: Material of a surface, or materials of even thicknesses of a film, from the factor on its lengths
 #: (`ScaleRange.centre`) and wavelengths, nm.
 MaterialsOf = Callable[
     [float, tuple[float, float]], Sequence[conserved.Reflector | conserved.Transmitter]
@@ -59,7 +60,7 @@ class EnergyModel:
         keep the table.
     conserving : whether light is multiplied by s.
     beneath : whether light that is not reflected goes on to a nested BSDF, by the albedo.
-    place : function that returns the place, 0 to 1, among several materials at hits.
+    thickness : of a film by a texture, or None.
     """
 
     def __init__(
@@ -70,10 +71,10 @@ class EnergyModel:
         *,
         conserving: bool,
         beneath: bool = False,
-        place: Callable[[Interaction], Float] | None = None,
+        thickness: Thickness | None = None,
     ) -> None:
         mono = wavelength, wavelength
-        self._materials_of, self._place = materials_of, place
+        self._materials_of, self._thickness = materials_of, thickness
         self._range = mono if mi.is_monochromatic else wavelength_range
         self.conserving, self.beneath = conserving, beneath
         self._scale: DirectionLookup | None = None
@@ -90,10 +91,13 @@ class EnergyModel:
         after there were some: an optimisation compiles no other kernel.
         """
         self._factors, wavelengths = factors, factors.wavelengths(self._range)
+        if self._thickness is not None and self.beneath and mi.is_spectral:
+            first, second, *_ = albedo_wavelengths(wavelengths).tolist()
+            self._thickness.beyond = second / first
         materials = self._materials_of(factors.centre, self._range)
         self._both_sides = isinstance(materials[0], conserved.Transmitter)
-        # many places of a film that varies, at each fringe, would take minutes
-        fringes = self.beneath and self._place is None
+        # many thicknesses, at each fringe, would take minutes: see `DirectionLookup`
+        fringes = self.beneath and self._thickness is None
         self._energies = [
             Energy(table, material, wavelengths, factors.least, fringes) for material in materials
         ]
@@ -104,24 +108,26 @@ class EnergyModel:
             if scales is not None and factors.differentiable:
                 self._ones = ones_like(scales[0])
             self._scale = (
-                None if scales is None else DirectionLookup(scales, nodes, factors, self._place)
+                None if scales is None else DirectionLookup(scales, nodes, factors, self._thickness)
             )
         if self.beneath:
             nodes, excesses = self._nodes(_excess_of)
             assert excesses is not None
-            self._excess = DirectionLookup(excesses, nodes, factors, self._place)
+            self._excess = DirectionLookup(
+                excesses, nodes, factors, self._thickness, fringes=mi.is_spectral
+            )
 
     def _nodes(
         self, sides_of: SidesOf
     ) -> tuple[list[float], Sequence[Sequence[DirectionalTable]] | None]:
-        """Return nodes, of height scales or of the place, and a function's tables at them."""
-        if self._place is None:
+        """Return nodes, of height scales or thicknesses, nm, and a function's tables at them."""
+        if self._thickness is None:
             (energy,) = self._energies
             nodes = self._factors.nodes(energy)
             return nodes, scales_of([sides_of(energy, energy.at(node)) for node in _counted(nodes)])
         height, energies = self._factors.height_scale, _counted(self._energies)
-        places = np.linspace(0.0, 1.0, len(self._energies)).tolist()
-        return places, scales_of([_at_height(each, sides_of, height) for each in energies])
+        thicknesses = np.linspace(*self._thickness.tabulated, len(self._energies)).tolist()
+        return thicknesses, scales_of([_at_height(each, sides_of, height) for each in energies])
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""
@@ -163,7 +169,7 @@ class EnergyModel:
     def _tabulated(self, sides_of: SidesOf, height_scale: float) -> DirectionalTable | None:
         """Return the function that a look-up shows above the surface; None where it is 1.
 
-        Where the material varies, that at place 0: no shader shows it.
+        Where a film varies, that of the thinnest: no shader shows it.
         """
         centre = self._factors.centre
         sides = _at_height(self._energies[0], sides_of, height_scale / centre)
@@ -246,7 +252,7 @@ def _rounded_indices(
 ) -> Any:
     """Return indices to `INDEX_STEP`, of the light that tables have at these wavelengths.
 
-    at : `Material.at` of a place.
+    at : `Material.at` of a thickness.
     centre : factor on lengths, `ScaleRange.centre`; wavelength_range : of the light, nm.
     """
     exact = at(np.clip(wavelengths * centre, *wavelength_range))

@@ -104,7 +104,14 @@ class Thickness(Varying):
     ----------
     value : number, or raw texture or mesh attribute of one channel.
     ends : thicknesses where a texture is 0 and 1.
+
+    Attributes
+    ----------
+    beyond : factor by which the largest thickness of `places` is above all others, and the smallest
+        below them.
     """
+
+    beyond = 1.0
 
     def __init__(self, value: float | Texture, ends: tuple[float, float]) -> None:
         self._ends = ends
@@ -118,14 +125,15 @@ class Thickness(Varying):
         value = super().at(si, active)
         return value if self.texture is None else dr.fma(value, self._rise, self._first)
 
-    def place(self, si: Interaction) -> Float:
-        """Return a texture's value."""
-        return super().at(si, True)
-
     def places(self, step: float) -> list[float]:
-        """Return thicknesses, `step` apart at most, at even values of a texture from 0 to 1."""
-        first, last = self._ends
-        return np.linspace(first, last, 2 + math.floor(abs(last - first) / step)).tolist()
+        """Return even thicknesses over a texture's, `step` apart at most."""
+        first, last = self.tabulated
+        return np.linspace(first, last, 2 + math.floor((last - first) / step)).tolist()
+
+    @property
+    def tabulated(self) -> tuple[float, float]:
+        """Smallest and largest of `places`."""
+        return min(self._ends) / self.beyond, max(self._ends) * self.beyond
 
     @property
     def number(self) -> float:

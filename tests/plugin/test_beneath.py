@@ -55,12 +55,26 @@ def test_flags_say_what_there_is(some_variant):
     assert mi.has_flag(coated.flags(1), mi.BSDFFlags.DiffuseReflection)
 
 
+#: Texels of 0.7 at (0, 0), of 0 and of 1.
+THICKNESSES = {
+    "type": "bitmap", "raw": True, "filter_type": "nearest",
+    "bitmap": mi.Bitmap(np.array([[[0.7], [0.0], [1.0]]], np.float32)),
+}  # fmt: skip
+FRINGES = {
+    "one thickness": {"film_thickness": 1738.0},
+    "texture": {
+        "film_thickness": THICKNESSES, "film_thickness_min": 600.0, "film_thickness_max": 700.0,
+    },
+}  # fmt: skip
+
+
 @pytest.mark.thorough
-def test_a_film_of_many_fringes_over_white_sends_on_no_more_than_it_gets(some_variant):
+@pytest.mark.parametrize("name", FRINGES)
+def test_a_film_of_many_fringes_over_white_sends_on_no_more_than_it_gets(some_variant, name):
     # the flat film's fringes come and go within 25 nm; a window of a wavelength smears them
     before = use_energy_settings(EnergySettings(polar=24, azimuthal=12))
     white = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
-    film = {"film_ior": 1.32, "film_thickness": 1738.0, "int_ior": 1.1, "ext_ior": 1.0}
+    film = FRINGES[name] | {"film_ior": 1.32, "int_ior": 1.1, "ext_ior": 1.0}
     bsdf = load(**film, coherence_width=0.5, beneath=white)
     use_energy_settings(before)
     for seed in range(4):  # of the wavelengths

@@ -198,8 +198,7 @@ class SurfaceEnergy:
         It has fewer directions than its scale, and fewer wavelengths, but `least`.
         """
         coarse = self._grid.half
-        count = max(4, self._settings.wavelengths // 4)
-        wavelengths = spread(wavelength_range, count, max(least, 2))
+        wavelengths = albedo_wavelengths(wavelength_range, least)
         theta = np.concatenate([coarse.theta, GRAZING])
         lights = self._lights(wavelengths, theta, coarse.phi)
         albedos = np.stack(parallel(lambda light: light().sent(self._ones)[0], lights))
@@ -239,6 +238,12 @@ class SurfaceEnergy:
 
         for first in (0, 1):  # every other pair at a time: neighbours share a wavelength
             parallel(lower, range(first, len(between), 2))
+
+
+def albedo_wavelengths(wavelength_range: tuple[float, float], least: int = 2) -> Real:
+    """Wavelengths (nm) of a reflector's albedo over a range, `least` or more."""
+    count = max(4, energy_settings().wavelengths // 4)
+    return spread(wavelength_range, count, max(least, 2))
 
 
 def spread(wavelength_range: tuple[float, float], count: int, least: int = 2) -> Real:
