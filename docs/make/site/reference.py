@@ -28,7 +28,7 @@ def _module(name: str, module: ModuleType) -> str:
     summary = (module.__doc__ or "").split("\n\n")[0]
     parts = [f"## md.{name}", summary]
     for member in getattr(module, "__all__", []):
-        value = getattr(module, member)
+        value = getattr(module, member, module)  # modules may not be imported yet
         if isinstance(value, ModuleType):
             continue
         where = getattr(value, "__module__", None)
