@@ -71,12 +71,14 @@ def thin_grating(
 @functools.cache
 def listed_grating() -> OrderTable:
     """`thin_grating` in light from -20, 0 and 20° alone."""
+    light = itertools.product(range(380, 781, 50), (-20, 0, 20), range(-6, 7))
+    lam, theta, m = np.array(list(light)).T
+    sine = np.sin(np.radians(theta))
+    values = thin_grating().efficiency(-sine, 0.0, lam, m)
+    leaves = np.abs(m * lam / (1e3 * PERIOD) - sine) < 1.0
+    columns = (part[leaves].tolist() for part in (lam, theta, m, values, values))
     lines = ["wavelength_nm,theta_deg,order,R_s,R_p"]
-    for lam, theta, m in itertools.product(range(380, 781, 50), (-20, 0, 20), range(-6, 7)):
-        sine = np.sin(np.radians(theta))
-        if abs(m * lam / (1e3 * PERIOD) - sine) < 1.0:
-            value = float(thin_grating().efficiency(-sine, 0.0, lam, m))
-            lines.append(f"{lam},{theta},{m},{value},{value}")
+    lines += [",".join(map(str, row)) for row in zip(*columns, strict=True)]
     with tempfile.TemporaryDirectory() as folder:
         (file := Path(folder, "thin_sinusoid.csv")).write_text("\n".join(lines), "utf-8")
         return md.read_orders(file, PERIOD)
