@@ -94,7 +94,10 @@ def quoted(value: object) -> str:
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:
-    """Return a number and what it counts, "1 scan" or "3 scans"; the noun is in the singular."""
+    """Return a number with its noun, "1 scan" or "3 scans".
+
+    noun : in the singular; plural : of a noun that takes no s.
+    """
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 

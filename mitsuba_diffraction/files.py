@@ -29,7 +29,7 @@ TABLE_ATTRIBUTE = "mitsuba_diffraction"
 ORDERS_ATTRIBUTE = "mitsuba_diffraction_orders"
 #: Name of this program in a plot.
 SOFTWARE = "mitsuba-diffraction"
-#: First columns of the CSV files that this program writes; theirs is no comment to tell them by.
+#: First columns of the CSV files that this program writes, by which they are told from scans.
 RESULTS = (
     ("wl",), ("spectrum",), ("group", "scan"), ("patch1", "patch2"), ("file", "sample"),
     ("sample", "scans"), ("frequency_per_um",), ("wavelength_nm", "ridge_deg"),

@@ -47,6 +47,6 @@ class Stages:
         number, self._begun = self._begun, self._begun + 1
 
         def tell(done: int, total: int, text: str) -> None:
-            self._progress(100 * number + 100 * done // total, 100 * self._count, text)
+            self._progress(100 * number + 100 * done // max(total, 1), 100 * self._count, text)
 
         return tell

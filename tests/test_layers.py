@@ -123,7 +123,7 @@ def hidden_by(name: str) -> Path | None:
         if not exported and (room / part / "__init__.py").is_file():
             room /= part
         elif exported:
-            # a function is no module of the same name
+            # a function hides the module of the same name
             names = rf"(\([^)]*|.*)\b{exported}\b"
             if re.search(rf"^from \.{exported} import {names}", initial(room), re.M):
                 return room

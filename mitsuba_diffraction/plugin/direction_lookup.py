@@ -100,11 +100,12 @@ class DirectionLookup:
             at = (self._first - dr.log2(k * frame.stretch)) * self._pages_per_log
             n = index_of(index_between(at, 0.0, self._pages - 1.0))
             within = clip(at - float_of(n), 0.0, 1.0)
-            ends = pages(n)
             if self._fringes:  # at thicknesses d λn/λ
                 ratios = [dr.exp2((end - within) * self._logs_per_page) for end in (0.0, 1.0)]
                 shares = [(place * ratio - self._low) * self._slope for ratio in ratios]
                 ends = [pages(n, share)[end] for end, share in enumerate(shares)]
+            else:
+                ends = pages(n)
             values.append(dr.lerp(*ends, within))
         return values
 

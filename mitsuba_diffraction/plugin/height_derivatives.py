@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -33,7 +34,11 @@ class DifferentiableHeights(NamedTuple):
     treated: Real
 
     def coefficients(self, table: DiffractionTable, record: BinRecord) -> tuple[Buffer, Buffer]:
-        """Return the records of bins and of order 0, which change with the heights."""
+        """Return the records of bins and of order 0, which change with the heights.
+
+        table : without `tables.build.derivatives.missing`.
+        record : of its bins.
+        """
         linear = HeightDerivatives(table, self.treated)
         bins, order_0 = dr.custom(_Coefficients, self.values, linear, table, record)
         return bins, order_0
@@ -45,7 +50,7 @@ class _Coefficients(dr.CustomOp):
     def eval(
         self, heights: Any, linear: HeightDerivatives, table: DiffractionTable, record: BinRecord
     ) -> tuple[Buffer, Buffer]:
-        self._linear, self._shape = linear, np.shape(heights)
+        self._linear = linear
         self._parts = table.coefficients / np.float32(table.scale), table.order_0
         self._records = record, BinRecord.aligned(*table.order_0.shape[1:])
         return self._packed(self._parts)
@@ -64,10 +69,9 @@ class _Coefficients(dr.CustomOp):
     def backward(self) -> None:
         parts = []
         for record, part, given in zip(self._records, self._parts, self.grad_out(), strict=True):
-            numbers = np.zeros(record.pack(part).size)
-            numbers[:] = np.array(given)  # a literal is of one number
-            terms = numbers.reshape(*part.shape[:-1], record.stored)[..., : record.terms]
-            parts.append(terms)
+            shape = *part.shape[:-1], record.stored
+            numbers = np.broadcast_to(np.array(given), math.prod(shape))  # a literal is one number
+            parts.append(numbers.reshape(shape)[..., : record.terms])
         self.set_grad_in("heights", tensor(self._linear.backward(*parts)))
 
     def name(self) -> str:

@@ -43,7 +43,7 @@ class SeriesValue(NamedTuple):
 class Recurrence:
     """Chebyshev's and Taylor's series.
 
-    order_0 : records of order 0's series in the variant's memory; by default those of the table.
+    order_0 : records of order 0's series in the variant's memory; by default the table's records.
     """
 
     def __init__(self, table: DiffractionTable, order_0: Buffer | None = None) -> None:

@@ -249,7 +249,8 @@ class DiffractingSurface(SurfaceBSDF):
         """Return what the surface lacks to have derivatives by its heights."""
         assert self.given is not None
         heights, given = self.heights().heights, np.array(self.given.values)
-        treated = heights.shape != given.shape or np.ptp(heights - given) > 1e-5 * np.ptp(given)
+        rounding = 1e-5 * np.ptp(given) + np.spacing(np.abs(given).max())  # of single precision
+        treated = heights.shape != given.shape or np.ptp(heights - given) > rounding
         lacks = {
             "a spectral or mono variant": mi.is_rgb,
             "model=kirchhoff": self.boundary.model.name != KIRCHHOFF.name,

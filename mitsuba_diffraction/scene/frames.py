@@ -70,8 +70,8 @@ class Frame:
 def check_frames(scene: Path, frames: Sequence[Frame]) -> None:
     """Refuse values of later frames before the first is rendered, in the variant that is set.
 
-    The scene is parsed with the values of each frame, and loaded with those of the last: allowed
-    values are intervals, which hold all values between two that they hold.
+    The scene is parsed with the values of each frame, and loaded with the values of the last frame:
+    allowed values are intervals, which hold all values between any two allowed ones.
 
     Raises a DiffractionError that names the frame.
     """

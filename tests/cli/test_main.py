@@ -146,7 +146,7 @@ def test_ctrl_c_while_options_are_parsed_exits_with_130(run, monkeypatch):
 
 @pytest.mark.parametrize("kind", [SystemError, ImportError])
 def test_ctrl_c_within_the_import_of_an_extension_exits_with_130(run, command, kind):
-    """Python and nanobind make errors of their own of it."""
+    """Python and nanobind turn the interrupt into an error of another class."""
 
     def action():
         raise kind("Encountered an error while initializing") from KeyboardInterrupt()

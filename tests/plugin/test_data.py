@@ -132,6 +132,12 @@ def test_derivatives_by_heights_are_refused_where_there_are_none(some_variant, o
     assert np.array_equal(values(bsdf, "dielectric"), before)
 
 
+def test_heights_far_from_zero_have_derivatives(mono):
+    high = md.HeightField(1000.0 + PATCH.heights, PATCH.pixel_size)
+    parameters = mi.traverse(mi.load_dict(md.bsdf_dict(high, **SETTINGS)))
+    assert not int(parameters.flags("data")) & int(mi.ParamFlags.NonDifferentiable)
+
+
 def test_heights_with_derivatives_have_the_values_of_others(mono):
     bsdf = mi.load_dict(md.bsdf_dict(PATCH, **SETTINGS))
     before, parameters = values(bsdf, "dielectric"), mi.traverse(bsdf)

@@ -1,7 +1,8 @@
 """Derivatives of a table's coefficients by the heights of a patch that tiles the plane (NumPy).
 
 With the orders a_j = mean of exp(iκh) exp(iq_j·r) of N pixels, a change dh of the heights changes
-the power of an order by 2 Re[a_j* mean of iκ dh exp(iκh) exp(iq_j·r)], and a loss L changes by
+the power of an order by 2 Re[a_j* mean of iκ dh exp(iκh) exp(iq_j·r)], and a loss L changes by the
+adjoint of the DFT (as in gradients of phase retrieval: Fienup 1982, Applied Optics 21, 2758)
 
     ∂L/∂h = −(2κ/N) Im[exp(iκh) · conj Σ_j (∂L/∂|a_j|²) a_j exp(−iq_j·r)].
 
@@ -62,7 +63,10 @@ class HeightDerivatives:
         return bins, order_0
 
     def backward(self, bins: Real, order_0: Real) -> Real:
-        """Return the derivative (ny, nx) of a loss by heights, 1/µm, from those by coefficients."""
+        """Return the derivative of a loss by heights, (ny, nx), 1/µm.
+
+        bins, order_0 : its derivatives by coefficients, in the shapes that `forward` returns.
+        """
         table = self._table
         total = np.zeros_like(self._heights)
         for interval, kappa, fit, screen in self._nodes():

@@ -189,7 +189,7 @@ class Transport:
             [self._order_0_at(theta[rows], nodes) for rows in _blocks(len(theta), len(nodes.x))]
         )
         turns = grid.turns(phi)
-        # light that comes in the plane y = 0 leaves alike on both sides of it
+        # the lobe of light that comes in the plane y = 0 is symmetric about this plane
         kernels = [
             (turned, shares @ sum(grid.interpolation(nodes.theta, offset + side).matrix
                                   for side in (nodes.azimuth, -nodes.azimuth)))

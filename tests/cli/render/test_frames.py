@@ -222,7 +222,7 @@ def test_a_preview_is_half_as_wide_and_quick(render):
 @pytest.mark.parametrize(
     ("change", "said"),
     [("spp=2:3", "frame_0001: cannot load the scene: "), ("wide=16:-16", "frame_0002: ")],
-    ids=["a fraction between", "a size that is none at the end"],
+    ids=["a fraction in a frame between", "a width of 0 in the last frame"],
 )
 def test_values_of_later_frames_are_refused_before_the_first_is_rendered(
     render, scene, change, said

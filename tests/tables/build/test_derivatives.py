@@ -1,4 +1,4 @@
-"""Derivatives of coefficients by heights are those of differences of tables, both ways."""
+"""Derivatives of coefficients by heights equal differences of tables, forward and backward."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PATCHES = {
 
 
 def table_of(patch: Any, heights: Array) -> Any:
-    # so close that single coefficients are those of their powers; nothing is a half float
+    # a tolerance at which single coefficients follow the powers, in single precision
     return md.DiffractionTable.build(
         md.HeightField(heights, patch.pixel_size, periodic=True),
         coherence_width=2.0, basis="chebyshev", tolerance=1e-4, wavelength_range=(600.0, 700.0),
