@@ -35,12 +35,17 @@ def pigment_bsdf(text: str | float) -> BSDF:
     text : a grey from 0 to 1, three linear sRGB values "0.3,0.2,0.1", a colour "#804020" or
         "sienna", a text of wavelengths and reflectances (`text_spectra`), a picture, or a glTF
         file, whose material's base colour is taken. The name of a column and a unit may follow a
-        text: "feathers.csv:male:percent".
+        text: "feathers.csv:male:percent". Files are looked for where Mitsuba looks for them: beside
+        the scene, too.
 
     Raises a DiffractionError if the text is not one of these, or the spectrum is not one or ends
     within 400 to 700 nm.
     """
-    return mi.load_dict({"type": "diffuse", "reflectance": _reflectance(str(text))})
+    text = str(text)
+    path = choice_of(text).path
+    if Path(path).suffix.lower() in (*SPECTRA, *PICTURES, *GLTF):
+        text = str(mi.file_resolver().resolve(path)) + text[len(path) :]
+    return mi.load_dict({"type": "diffuse", "reflectance": _reflectance(text)})
 
 
 def pigment_range(text: str | float | None) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from ..heights.preprocess import fill_missing
 from ..heights.read import fill_method, treat
 from ..progress import show
 from ..settings import SURFACE, checked
-from ..tables import DiffractionTable, TableSource
+from ..tables import DiffractionTable, TableSource, providing
 from ..tables.source import loaded_table
 from .dictionary import Data
 from .parameter_changes import GivenHeights
@@ -75,7 +75,12 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
             given = replace(field, heights=heights)
             return _built(TableSource.of(treat(given, options)), asked, height_scale, stretch)
 
-        return patch_of(field.heights)._replace(given=GivenHeights("data", field.heights, patch_of))
+        def changed(heights: NDArray[np.float64]) -> Patch:
+            # each step of an optimisation has others, and none of them comes back
+            with providing(lambda request: request.built(request.settings)):
+                return patch_of(heights)
+
+        return patch_of(field.heights)._replace(given=GivenHeights("data", field.heights, changed))
     if not isinstance(value, str):
         raise DiffractionError(f"{name}={value!r} must be the name of a file")
     source = TableSource.of(resolved_path(value, name), options)

@@ -101,10 +101,10 @@ class TableRequest:
     def cached(self, settings: TableSettings) -> DiffractionTable:
         """Return the table with these settings, from the cache or built."""
         names = self.source.names
-        return cached_table(self.digest, settings, lambda: self._built(settings), names)
+        return cached_table(self.digest, settings, lambda: self.built(settings), names)
 
-    def _built(self, settings: TableSettings) -> DiffractionTable:
-        """Build the table; warnings are one line for a file."""
+    def built(self, settings: TableSettings) -> DiffractionTable:
+        """Build the table with these settings; warnings are one line for a file."""
         source = self.source
         heights = [field.stretched(self.stretch) for field in source.fields()]
         table = build_with(heights, settings, self.progress)

@@ -50,6 +50,16 @@ def test_other_heights_are_as_if_loaded(some_variant, kind):
     assert np.array_equal(values(bsdf, kind), before)
 
 
+def test_changed_heights_leave_no_files(some_variant, tmp_path, monkeypatch):
+    """Each step of an optimisation would leave a table in the cache that nobody asks for again."""
+    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
+    bsdf = load()
+    loaded = sorted(tmp_path.rglob("*"))
+    set_heights(bsdf, OTHER.heights)
+    assert loaded
+    assert sorted(tmp_path.rglob("*")) == loaded
+
+
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_spectral"])
 def test_albedo_and_pictures_follow_heights(variant):
     if not runs(variant):

@@ -149,3 +149,18 @@ def test_a_picture_is_a_pigment_by_texture_coordinates(spectral, tmp_path):
     assert "BitmapTexture" in str(pigment_bsdf(str(file)))
     with pytest.raises(md.DiffractionError, match="does not exist"):
         pigment_bsdf(str(tmp_path / "missing.png"))
+
+
+@pytest.mark.parametrize("named", ["brown.csv", "brown.csv:dark"])
+def test_a_scenes_pigment_lies_beside_it(some_variant, tmp_path, monkeypatch, named):
+    (tmp_path / "brown.csv").write_text("wl,dark\n350,0.1\n800,0.4\n")
+    np.save(tmp_path / "flat.npy", FLAT.heights)
+    scene = tmp_path / "scene.xml"
+    scene.write_text(
+        "<scene version='3.0.0'><bsdf type='diffraction'><string name='filename' value='flat.npy'/>"
+        "<float name='pixel_size' value='1'/><string name='material' value='keratin'/>"
+        f"<string name='pigment' value='{named}'/></bsdf></scene>"
+    )
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert mi.load_file(str(scene)) is not None
