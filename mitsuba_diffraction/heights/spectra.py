@@ -231,7 +231,9 @@ class _Spectrum:
         ring = (np.abs(self.repeats - repeats) < 1.5) & ~line & self.half
         beside = line & (along > 1 / _BESIDE[1]) & (along < 1 / _BESIDE[0])
         beside &= self.repeats < repeats - _LOBE - 0.5  # the lobe lies between two bins
-        background = [float(np.median(power[part])) for part in (ring, beside) if part.any()]
+        # bins that a stronger peak explains are 0, and say nothing of these surroundings
+        seen = (part & (power > 0.0) for part in (ring, beside))
+        background = [float(np.median(power[part])) for part in seen if part.any()]
         return _Peak(
             centre=centre,
             highest=(iy, ix),
@@ -240,7 +242,7 @@ class _Spectrum:
             explained=line | (np.abs(across) <= math.tan(math.radians(_SAME)) * np.abs(along)),
             share=2.0 * mass / self.total,  # twice: the mirror image holds as much
             repeats=float(np.hypot(*(centre * (width, height)))),
-            contrast=float(power[iy, ix] / max(max(background, default=0.0), 1e-300)),
+            contrast=float(power[iy, ix] / max(*background, 1e-30 * power[iy, ix], 1e-300)),
         )
 
     def fundamental(self, peak: _Peak) -> _Peak | None:

@@ -168,6 +168,20 @@ def test_a_scale_s_bending_does_not_hide_its_fingers():
         assert abs(found.direction) < 2.0
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_waviness_beside_a_grating_has_no_period(seed):
+    """Frequencies that the grating explains are no surroundings, out of which waviness stands."""
+    rng = np.random.default_rng(seed)
+    y, x = 0.1 * np.mgrid[:200, :200]
+    heights = 0.1 * np.cos(2.0 * np.pi * x)
+    for turn in np.radians(np.arange(0.0, 180.0, 9.0)):
+        along = (np.cos(turn) * x + np.sin(turn) * y) * rng.uniform(0.15, 0.27)
+        heights += 0.02 * np.cos(2.0 * np.pi * along + rng.uniform(0.0, 2.0 * np.pi))
+    found = examine_periods(HeightField(heights, 0.1))
+    assert [one.period for one in found.gratings] == pytest.approx([1.0], rel=0.01)
+    assert found.weak is None
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_rough_surfaces_have_none(seed):
     rough = rough_patch((160, 200), (0.1, 0.1), 0.2, correlation=0.4 * (1 + seed % 3), seed=seed)
