@@ -100,6 +100,16 @@ class Path:
         return self.came.beyond_face or self.left.beyond_face
 
     @property
+    def critical_sine(self) -> float:
+        """Sine of incidence beyond which light is totally reflected; 1 where none is."""
+        if self.let_through or self.index is None or isinstance(self.index, Filmed | Stacked):
+            return self.came.critical_sine
+        if abs(np.imag(self.index)) > 0.0:
+            return 1.0
+        sine = float(np.real(self.index)) * self.came.at_structure / self.came.index
+        return min(sine, 1.0)
+
+    @property
     def sign(self) -> int:
         """Sign of the orders' frequencies: seen from below, heights are turned over."""
         return -1 if self.came.number or self.left.number else 1

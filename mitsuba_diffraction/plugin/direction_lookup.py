@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import drjit as dr
 import mitsuba as mi
@@ -37,6 +38,8 @@ class DirectionLookup:
     thickness : of a film; `nodes` are thicknesses then, nm.
     fringes : whether a value between wavelengths is that of the same fringe at both, of a film of
         the same share of the wavelength. At the same thickness fringes would be missed.
+    exponent : of the mean over a colour's light. That of scales s is −2: an albedo a asks for
+        s = 1/√a, so a colour's mean of s² a is 1 where 1/s² is the colour's albedo.
     """
 
     def __init__(
@@ -47,10 +50,12 @@ class DirectionLookup:
         thickness: Thickness | None = None,
         *,
         fringes: bool = False,
+        exponent: float = 1.0,
     ) -> None:
         height_scale, varies = scales.height_scale, scales.varies or thickness is not None
         self._thickness, self._fringes = thickness, fringes and thickness is not None
-        maps = np.stack([[_cells(side, scales.centre) for side in sides] for sides in tables])
+        cells = partial(_cells, stretch=scales.centre, exponent=exponent)
+        maps = np.stack([[cells(side) for side in sides] for sides in tables])
         self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
@@ -189,19 +194,23 @@ def between(
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
-def _cells(table: DirectionalTable, stretch: float) -> Single:
+def _cells(table: DirectionalTable, stretch: float, exponent: float) -> Single:
     """Values at the corners of each cell, (rows, columns, channels, 4).
 
     Spectra have intervals of wavelengths instead of channels, and 8 values: of both ends.
 
     stretch : factor from the table's wavelengths to the light's.
+    exponent : as of `DirectionLookup`.
 
     All wavelengths of a cell lie together: a call reads several of them, within few cache lines.
     """
     values = table.values
     if mi.is_rgb and len(values) > 1:
-        weights = _sensitivities(table.wavelengths * stretch)
-        values = np.tensordot(weights, values, 1).astype(np.float32)
+        powers = values**exponent
+        colours = np.tensordot(_sensitivities(table.wavelengths * stretch), powers, 1)
+        # red has negative weights in blue and green: its mean may be beyond all of the light's
+        limited = np.clip(colours, powers.min(axis=0), powers.max(axis=0))
+        values = np.asarray(limited ** (1.0 / exponent), np.float32)
     right = np.roll(values, -1, axis=2)
     corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
     cells = np.stack(corners, axis=-1).transpose(1, 2, 0, 3)
@@ -216,7 +225,7 @@ def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
     Weights are integrals over daylight of a function that is linear in log λ between wavelengths.
     """
     light = np.arange(*_DAYLIGHT)
-    power = np.maximum(linear_srgb(response(light)).T, 0.0)
+    power = linear_srgb(response(light)).T
     hats = [np.interp(np.log(light), np.log(wavelengths), row) for row in np.eye(len(wavelengths))]
     weights = power @ np.stack(hats, axis=1)
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))

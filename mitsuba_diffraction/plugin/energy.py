@@ -37,6 +37,10 @@ from .types import Colour, Vector3f
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
 #: rarely and sees s and the albedo's excess as constants.
 INDEX_STEP, COAT_STEP, DIELECTRIC_STEP = 0.05, 0.01, 0.002
+#: Of indices about and below that of the medium above, by which light is totally reflected.
+TOTAL_STEP = 1e-4
+#: Indices that differ from 1 by so many steps at most are rounded to this share of the step.
+NEAR, FINE_SHARE = 4.0, 0.02
 #: Largest change of a film's fringe by rounding its index, rad: at grazing angles light that a film
 #: guides gains several times, within narrow fringes.
 FILM_PHASE = 0.02
@@ -108,8 +112,9 @@ class EnergyModel:
             if scales is not None and factors.differentiable:
                 self._ones = ones_like(scales[0])
             self._scale = (
-                None if scales is None else DirectionLookup(scales, nodes, factors, self._thickness)
-            )
+                None if scales is None else
+                DirectionLookup(scales, nodes, factors, self._thickness, exponent=-2.0)
+            )  # fmt: skip
         if self.beneath:
             nodes, excesses = self._nodes(_excess_of)
             assert excesses is not None
@@ -223,11 +228,11 @@ def reflectors_of(
     wavelength_range: tuple[float, float],
 ) -> list[conserved.Reflector]:
     """Return the materials of a surface that reflects, under a coat or none (`MaterialsOf`)."""
-    index = 1.0 if coat is None else float(rounded_index(plain(coat.eta), COAT_STEP))
+    exact = 1.0 if coat is None else plain(coat.eta)
+    index = 1.0 if coat is None else float(rounded_index(exact, COAT_STEP))
+    how = (exact, index), centre, wavelength_range
     return [
-        conserved.Reflector(
-            boundary.model.name, partial(_rounded_indices, at, centre, wavelength_range), index
-        )
+        conserved.Reflector(boundary.model.name, partial(_rounded_indices, at, *how), index)
         for at in boundary.material.everywhere()
     ]
 
@@ -246,6 +251,7 @@ def dielectric_of(
 
 def _rounded_indices(
     at: IndexAt,
+    coat: tuple[float, float],
     centre: float,
     wavelength_range: tuple[float, float],
     wavelengths: NDArray[np.float64],
@@ -253,6 +259,7 @@ def _rounded_indices(
     """Return indices to `INDEX_STEP`, of the light that tables have at these wavelengths.
 
     at : `Material.at` of a thickness.
+    coat : index of the coat, as it is and rounded; 1 without one.
     centre : factor on lengths, `ScaleRange.centre`; wavelength_range : of the light, nm.
     """
     exact = at(np.clip(wavelengths * centre, *wavelength_range))
@@ -262,15 +269,28 @@ def _rounded_indices(
         index, film, depth = exact.parts
         phase = FILM_PHASE / max(float(np.max(np.real(depth))), 1e-9)
         fine = min(INDEX_STEP, 10.0 ** math.floor(math.log10(phase)))  # of decimal numbers as given
-        return fresnel.Filmed(rounded_index(index, INDEX_STEP), rounded_index(film, fine), depth)
-    return rounded_index(exact, INDEX_STEP)
+        return fresnel.Filmed(_under(coat, index), rounded_index(film, fine), depth)
+    return _under(coat, exact)
+
+
+def _under(coat: tuple[float, float], index: ArrayLike) -> NDArray[Any]:
+    """Return indices relative to a coat to `INDEX_STEP`, or to `TOTAL_STEP` about and below 1.
+
+    coat : its index as it is, and rounded. The product with the index says from which angle on
+        light from above is totally reflected, and a rounded one would move it.
+    """
+    values = np.asarray(index)
+    above = values * coat[0]
+    total = (np.real(above) < 1.0 + NEAR * INDEX_STEP) & (np.abs(np.imag(above)) < INDEX_STEP)
+    fine = np.maximum(np.round(np.real(above) / coat[1] / TOTAL_STEP), 1.0) * TOTAL_STEP
+    return np.where(total, fine + 1j * np.imag(values), rounded_index(values, INDEX_STEP))
 
 
 def rounded_index(index: ArrayLike, step: float) -> NDArray[Any]:
     """An index to a step, finer where it is close to 1, but not to 0, where no wave exists."""
     values = np.asarray(index)
-    contrast, fine = np.abs(values - 1.0), 0.02 * step
+    contrast, fine = np.abs(values - 1.0), FINE_SHARE * step
     rounded = np.where(
-        contrast > 4.0 * step, np.round(values / step) * step, np.round(values / fine) * fine
+        contrast > NEAR * step, np.round(values / step) * step, np.round(values / fine) * fine
     )
     return np.where(rounded == 0.0, step, rounded)

@@ -139,7 +139,7 @@ class SurfaceEnergy:
         fringes = math.ceil(self.material.phase(wavelength_range) / settings.fringe_step)
         most_fringes = min(fringes, settings.fringes)
         if not self._both_sides:
-            albedo, largest = self._albedo(wavelength_range, most_fringes if beneath else 0)
+            albedo, largest = self._albedo(wavelength_range, beneath, most_fringes)
         if largest <= settings.threshold:
             return Conservation(albedo)
         count = settings.side_wavelengths if self._both_sides else settings.wavelengths
@@ -153,7 +153,8 @@ class SurfaceEnergy:
         for place in places if len(nodes) > 1 else (0.0,):
             self._lower_between(nodes, place, parts, settings.calm[few], s)
 
-        if np.all(s == 1.0):
+        # light beyond the grid is attenuated wherever there is a scale
+        if np.all(s == 1.0) and (self._both_sides or largest <= settings.ceiling):
             return Conservation(albedo)
         return Conservation(albedo, *(DirectionalTable(nodes, s[:, n]) for n in range(s.shape[1])))
 
@@ -191,14 +192,18 @@ class SurfaceEnergy:
         return [partial(make, *both) for both in zip(paths, wavelengths.tolist(), strict=True)]
 
     def _albedo(
-        self, wavelength_range: tuple[float, float], least: int
+        self, wavelength_range: tuple[float, float], beneath: bool, fringes: int
     ) -> tuple[DirectionalTable, float]:
         """Return the albedo of a reflector as it is, and its largest value up to the horizon.
 
-        It has fewer directions than its scale, and fewer wavelengths, but `least`.
+        It has fewer directions than its scale, and fewer wavelengths. Of light that goes on beneath
+        it has a wavelength for each of a film's `fringes` at least, and more polar angles where
+        light is totally reflected: over the half of a lobe the albedo rises to 1 there.
         """
         coarse = self._grid.half
-        wavelengths = albedo_wavelengths(wavelength_range, least)
+        wavelengths = albedo_wavelengths(wavelength_range, fringes if beneath else 0)
+        if beneath and isinstance(self.material, Reflector) and self.material.total(wavelengths):
+            coarse = DirectionGrid(self._settings.total_polar, coarse.azimuthal)
         theta = np.concatenate([coarse.theta, GRAZING])
         lights = self._lights(wavelengths, theta, coarse.phi)
         albedos = np.stack(parallel(lambda light: light().sent(self._ones)[0], lights))

@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Real
-from ...optics import boundary, through
+from ...optics import boundary, fresnel, through
+from ...optics.coat import cosine_within
 from ...optics.fresnel import Filmed
 from ...optics.paths import ABOVE, Path, Returned, Side
 from ...optics.stack import Stacked
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | Stacked | None"]
+#: Cosine of light by which a material that reflects totally is told: from 89° on is too late.
+_GRAZING = 0.0175
 #: Wavelengths at which a material is told from another.
 PROBES = 24
 
@@ -52,6 +55,14 @@ class Reflector:
         """Return the material's part of the cache key over a range of wavelengths (nm)."""
         index = rounded(self.index(np.geomspace(*wavelength_range, PROBES)))
         return [self.model, index, self.coat]
+
+    def total(self, wavelengths: Real) -> bool:
+        """Whether light of wavelengths (nm) from above is totally reflected from some angle on."""
+        index: Any = self.index(wavelengths)
+        if index is None:
+            return False
+        within = cosine_within(np.array(_GRAZING), np.array(self.coat))
+        return bool(fresnel.reflectance(within, index[:, None]).max() > 1.0 - 1e-9)
 
     def phase(self, wavelength_range: tuple[float, float]) -> float:
         """Phase (rad) by which a film's fringe advances over a range of wavelengths (nm)."""
