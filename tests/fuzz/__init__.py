@@ -4,7 +4,6 @@ Contents
 --------
 surfaces       height fields built, saved, loaded, looked up in NumPy and in the plugin
 damage         files of tables, heights, recipes, meshes, plans and scenes with random damage
-cached         files of the cache with random damage
 energy         scales, layers, speckle and nested light in a white furnace
 command_lines  random arguments of every command
 
