@@ -134,7 +134,8 @@ def test_jones_matrices_have_the_efficiencies_of_s_and_p():
     ],
 )  # fmt: skip
 def test_light_outside_the_directions_of_a_list_is_warned_of(theta, phi, nearest):
+    table = listed_grating()  # warns of its directions itself
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        list_orders(listed_grating(), 580.0, theta, phi)
+        list_orders(table, 580.0, theta, phi)
     assert [nearest in str(each.message) for each in caught] == [True] * (nearest is not None)
