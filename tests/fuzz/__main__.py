@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from mitsuba_diffraction.streams import own_program
-from tests.fuzz import command_lines, damage, energy, orders, surfaces, updates
+from tests.fuzz import command_lines, damage, energy, orders, surfaces
 
 KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "tables": damage.check_table,
@@ -28,23 +28,22 @@ KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "commands": command_lines.check,
     "surfaces": surfaces.check,
     "scenes": damage.check_scene,
-    "updates": updates.check,
     "orders": orders.check,
     "energy": energy.check,
 }
 #: A kind's number decides its random numbers: new ones go to the end.
 _STREAMS = {
     "commands": 0, "heights": 1, "surfaces": 2, "tables": 3, "texts": 4, "documents": 5,
-    "scenes": 7, "updates": 9, "orders": 10, "energy": 11,
+    "scenes": 7, "orders": 10, "energy": 11,
 }  # fmt: skip
 #: Share of the time that each kind gets.
 _SHARES = {
-    "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.1, "scenes": 0.05,
-    "commands": 0.1, "surfaces": 0.1, "updates": 0.05, "orders": 0.1, "energy": 0.2,
+    "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.1, "scenes": 0.1,
+    "commands": 0.1, "surfaces": 0.1, "orders": 0.1, "energy": 0.2,
 }  # fmt: skip
 #: Cases of each kind that take about a second together.
 ROUND = {"tables": 30, "documents": 50, "heights": 20, "texts": 30, "commands": 10, "surfaces": 2}
-ROUND |= {"scenes": 20, "updates": 1, "orders": 30, "energy": 1}
+ROUND |= {"scenes": 20, "orders": 30, "energy": 1}
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
 #: less than one, and some where kernels are compiled on a slow machine. Scales of energy of a thick
 #: film whose lengths vary take a minute.
