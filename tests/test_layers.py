@@ -197,7 +197,6 @@ INNER = {
         "tables.document.parse_document", "tables.document.shape_of",
         "tables.document.with_coefficients",
     },
-    "fuzz/cached.py": {"tables.document.from_record", "tables.document.to_record"},
     # work that users cannot make less
     "support/coarse.py": {
         "realtime.glsl.bounces._POINTS", "realtime.glsl.surroundings._CELLS",

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -17,10 +19,9 @@ from mitsuba_diffraction.heights import Recipe
 from mitsuba_diffraction.scene import load_scene
 from mitsuba_diffraction.scene.orientation import load_mesh
 from mitsuba_diffraction.tables.document import parse_document, shape_of, with_coefficients
-from tests.support.damage import mutate
+from tests.fuzz.looked_up import look_up_in_plugin, use_table
 from tests.support.directions import rough_patch
 from tests.support.instruments import nanoscope
-from tests.support.looked_up import look_up_in_plugin, use_table
 from tests.support.table_files import document_in
 
 _MOST = 500  # characters of a message
@@ -115,21 +116,29 @@ def _other_number(rng: np.random.Generator, data: bytearray) -> None:
 
 
 def check_table(rng: np.random.Generator) -> None:
-    """A table is refused, or every value that it gives is finite and not negative."""
-    _check(rng, [name for name in originals() if name.endswith(".exr")], use_table)
+    """A table is refused, or it is the one before the damage."""
+
+    def use(path: Path) -> None:
+        table = use_table(path)
+        assert (table.digest(), dict(table.source)) == identities()[path.name]
+
+    _check(rng, [name for name in originals() if name.endswith(".exr")], use)
 
 
 def check_document(rng: np.random.Generator) -> None:
-    """The same of tables whose plain data another program wrote, without care."""
+    """A table that another program wrote without care is refused, or its values are sane."""
     name = str(rng.choice([name for name in originals() if name.endswith(".exr")]))
     document = json.loads(documents()[name])
-    mutate(rng, document)
+    _mutate(rng, document)
     try:
         found = parse_document(document)
         # as many numbers as it declares, which `exr` compares with the file's size
         if int(np.prod(shape_of(found))) > _MOST_NUMBERS:
             return
         coefficients = rng.normal(0.0, 1e-3, shape_of(found)).astype(np.float32)
+        if rng.random() < 0.2 and coefficients.size:
+            place = rng.integers(coefficients.size)
+            coefficients.flat[place] = rng.choice([np.nan, np.inf, 1e4, -6e4, 1.0])
         table = with_coefficients(found, coefficients)
     except (md.DiffractionError, ValueError, MemoryError):  # what `load_table` makes one line of
         return
@@ -139,19 +148,55 @@ def check_document(rng: np.random.Generator) -> None:
         use_table(path)
 
 
-@functools.cache
-def documents() -> dict[str, str]:
-    """The plain data of the tables, as JSON."""
+def _mutate(rng: np.random.Generator, document: Any) -> None:
+    """Replace a value somewhere in nested data, or leave it out."""
+    place = document
+    while True:
+        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
+        key = keys[rng.integers(len(keys))]
+        if not isinstance(place[key], (dict, list)) or not place[key] or rng.random() < 0.15:
+            break
+        place = place[key]
+    if rng.random() < 0.1:
+        del place[key]
+        return
+    old = place[key]
+    numbers = [-1, 0, 1, 2, 3, 1000, 10**12, 0.5, 1e-30, 1e30, 1e300, math.nan, math.inf]
+    words: list[Any] = [None, True, "", "patch", "ensemble", "svd", [], {}, [1, 2], [[1.0]]]
+    if isinstance(old, (int, float)) and not isinstance(old, bool) and rng.random() < 0.7:
+        words = [old * 2, old + 1, -old, old * (1 + 1e-3), *numbers]
+    place[key] = [*words, *numbers][rng.integers(len(words) + len(numbers))]
+
+
+def _of_tables(read: Callable[[Path], Any]) -> dict[str, Any]:
+    """What a function reads in the file of each table."""
     with tempfile.TemporaryDirectory() as folder:
         found = {}
         for name, content in originals().items():
             if name.endswith(".exr"):
                 path = Path(folder, name)
                 path.write_bytes(content)
-                document = document_in(path)
-                document.pop("version")
-                found[name] = json.dumps(document)
+                found[name] = read(path)
         return found
+
+
+@functools.cache
+def documents() -> dict[str, str]:
+    """The plain data of the tables, as JSON."""
+    return _of_tables(_unversioned)
+
+
+def _unversioned(path: Path) -> str:
+    document = document_in(path)
+    del document["version"]
+    return json.dumps(document)
+
+
+@functools.cache
+def identities() -> dict[str, tuple[str, dict[str, Any]]]:
+    """Digest and source of each table."""
+    tables = _of_tables(md.DiffractionTable.load)
+    return {name: (table.digest(), dict(table.source)) for name, table in tables.items()}
 
 
 def check_heights(rng: np.random.Generator) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
-from tests.fuzz.light import surface
 from tests.fuzz.surfaces import log_uniform
 from tests.support.directions import polar
 from tests.support.lanes import interaction, lanes, spectra, vectors
@@ -107,6 +106,21 @@ def _stack(rng: np.random.Generator) -> str:
 
 def _texture(texels: NDArray[np.float64]) -> dict[str, Any]:
     return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(texels.astype(np.float32))}
+
+
+def surface(rng: np.random.Generator) -> md.HeightField:
+    """Flat, shallow or rough; noise, waves along x, or steps."""
+    ny, nx = (int(rng.integers(8, 49)) for _ in range(2))
+    x, y = np.arange(nx), np.arange(ny)[:, None]
+    shapes = (
+        rng.random((ny, nx)),
+        np.sin(2 * np.pi * int(rng.integers(1, 4)) * x / nx) + 0.0 * y,
+        1.0 * (x % 8 < 4) + 0.0 * y,
+    )
+    depth = (0.0, log_uniform(rng, 1e-4, 0.03), log_uniform(rng, 0.03, 0.2))[rng.integers(3)]
+    pixel = log_uniform(rng, 0.05, 0.1)
+    heights = depth * shapes[rng.integers(len(shapes))]
+    return md.HeightField(heights, (pixel, pixel * log_uniform(rng, 0.5, 2.0)))
 
 
 def grooves(rng: np.random.Generator) -> md.HeightField:

@@ -9,12 +9,15 @@ from tests.fuzz.__main__ import run_case
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("fine", "some_variant")]
 
 
-#: Cases that take 8 to 30 s each, two fifths of the time of all together; others have their
-#: variant, material, layers, window and scales: a patch as the window of a metal with layers or a
-#: mirror, and of a spectral sheet; sheets in colours and in a spectrum; both scales of sheets;
-#: stretched interfaces; spectral layers over a pigment; a texture that stretches a mirror.
-LONG = {27, 29, 41, 47, 135, 153, 167, 168, 172, 200}
-CASES = sorted(set(range(210)) - LONG)
+#: Cases that take longest. Every two of variant, material, layer, window, scales, model, shadowing
+#: and light beneath that meet in one of them meet in another case, but sheets in colours: 17 s.
+LONG = {
+    0, 2, 3, 20, 27, 29, 41, 43, 47, 51, 53, 58, 60, 62, 64, 65, 80, 83, 90, 91, 93, 105,
+    115, 119, 129, 130, 135, 144, 149, 153, 155, 161, 162, 167, 168, 172, 181, 187, 192,
+    196, 200, 209, 211, 212, 218, 230, 232, 233, 234, 255, 260, 262, 264, 288,
+}  # fmt: skip
+#: 200 combinations; others among them are refused at once.
+CASES = sorted(set(range(297)) - LONG)
 
 
 @pytest.mark.parametrize("block", range(50))

@@ -1,17 +1,15 @@
-"""A mirror's lobe: flat mirrors reflect as Fresnel says."""
+"""A mirror's lobe: flat mirrors reflect as Fresnel says, and the horizon cuts it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from mitsuba_diffraction.optics.boundary import geometry, power
 from mitsuba_diffraction.optics.fresnel import reflectance
-from mitsuba_diffraction.optics.mirror import (
-    horizon_correction,
-    mirror,
-    mirror_cosine,
-)
+from mitsuba_diffraction.optics.lobes import lobe_means
+from mitsuba_diffraction.optics.mirror import horizon_correction, mirror, mirror_cosine
 
 #: 2π/λ of 550 nm, rad/µm.
 WAVENUMBER = 2e3 * np.pi / 550.0
@@ -75,3 +73,15 @@ def test_the_lobe_is_reciprocal_and_that_of_fresnel_in_the_mirror_direction():
     pair = geometry(wi, mirrored)
     flat = power(mirror(pair, pair.cos_half, index))
     assert flat == pytest.approx(float(reflectance(np.float64(wi[2]), index)), rel=1e-12)
+
+
+def test_means_over_a_cut_lobe_are_those_of_its_gaussian():
+    width, radius = 0.06, np.array([0.7, 0.92, 0.98, 1.0, 1.05])
+    sine = 1.0 - (np.arange(20000) + 0.5) / 20000 * 0.6
+    lobe = np.exp(-(((sine - radius[:, None]) / width) ** 2)) * (0.6 / 20000)
+    visible, cosine = lobe.sum(axis=1), np.sqrt(1.0 - sine**2)
+    found = lobe_means(width, radius)
+    # tables of 96 places
+    assert_allclose(found.visible, visible / (np.sqrt(np.pi) * width), atol=3e-3)
+    assert_allclose(found.cosine, lobe @ cosine / visible, atol=3e-3)
+    assert_allclose(found.pole[1:], (lobe @ (1.0 / cosine) / visible)[1:], rtol=0.02)

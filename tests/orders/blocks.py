@@ -71,7 +71,7 @@ def near_orders(n: int = 60, seed: int = 3) -> tuple[Array, Array, Array]:
     return np.array(wi), np.array(wo), np.array(orders)
 
 
-def reference(wi: Array, wo: Array, orders: Array) -> Array:
+def block_light(wi: Array, wo: Array, orders: Array) -> Array:
     """η k²σ²/π exp(−σ²|q − q_m|²) n² cosθo of light from ωi to ωo, per solid angle."""
     came, left = indices(wi), indices(wo)
     total = (came * wi + left * wo)[:, :2]

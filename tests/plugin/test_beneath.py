@@ -6,6 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+import mitsuba_diffraction as md
 from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Energy
@@ -55,6 +56,7 @@ def test_flags_say_what_there_is(some_variant):
     assert mi.has_flag(coated.flags(1), mi.BSDFFlags.DiffuseReflection)
 
 
+FLAT = md.HeightField(np.zeros((8, 8)), 0.05, periodic=True)
 #: Texels of 0.7 at (0, 0), of 0 and of 1.
 THICKNESSES = {
     "type": "bitmap", "raw": True, "filter_type": "nearest",
@@ -71,11 +73,11 @@ FRINGES = {
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", FRINGES)
 def test_a_film_of_many_fringes_over_white_sends_on_no_more_than_it_gets(some_variant, name):
-    # the flat film's fringes come and go within 25 nm; a window of a wavelength smears them
+    # its fringes come and go within 25 nm; a window of a wavelength smears them
     before = use_energy_settings(EnergySettings(polar=24, azimuthal=12))
     white = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
     film = FRINGES[name] | {"film_ior": 1.32, "int_ior": 1.1, "ext_ior": 1.0}
-    bsdf = load(**film, coherence_width=0.5, beneath=white)
+    bsdf = load(FLAT, **film, coherence_width=0.5, beneath=white)
     use_energy_settings(before)
     for seed in range(4):  # of the wavelengths
         mean, error = furnace(bsdf, angles=(70.0, 80.0, 84.0, 87.0), azimuths=(0.0,), seed=seed)

@@ -83,7 +83,7 @@ def test_the_raw_model_gains_energy(mono):
     assert furnace(surface, [75.0] * 8, [0.0])[0].max() > 1.2
 
 
-def test_white_furnace_of_the_measured_patch(shared_afm):
+def test_white_furnace_of_the_measured_patch(mono, shared_afm):
     patch = md.HeightField.load(
         shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375
     )

@@ -1,4 +1,4 @@
-"""A thin film over the heights: values, limits, colours, and what is refused."""
+"""Thin films and coats over the heights: light beneath, colours, textures, and refusals."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import as_single, polar
-from tests.support.lanes import evaluated, interaction
-from tests.support.layered import FLAT, load, pairs
+from tests.support.lanes import evaluated, interaction, refusal
+from tests.support.layered import FLAT, PATCH, WIDTH, load, pairs
 from tests.support.variants import evaluate
 
 pytestmark = pytest.mark.thorough
@@ -70,24 +70,47 @@ def test_in_rgb_a_mirror_has_the_film_s_colour():
     assert filmed / mirror == pytest.approx(film_colour(300.0), abs=5e-3)
 
 
+def under_film(cosine: Any) -> Any:
+    """What the film below lets through at a cosine."""
+    return 1 - reflectance(cosine, Filmed(1.56, 2.2, 2 * np.pi * 120.0 / 550.0))
+
+
+def under_coat(cosine: Any) -> Any:
+    """What the coat below and the flat structure beneath it let through, all bounces."""
+    inside = np.sqrt(1 - (1 - cosine**2) / 1.4**2)
+    face, structure = reflectance(cosine, 1.4), reflectance(inside, 1.6 / 1.4)
+    return (1 - face) * (1 - structure) / (1 - face * structure)
+
+
 @pytest.mark.parametrize("theta", [0.0, 45.0])
-def test_over_white_it_returns_what_the_film_lets_through(some_variant, theta):
+@pytest.mark.parametrize("passed", [under_film, under_coat])
+def test_over_white_it_returns_what_the_layer_lets_through(some_variant, passed, theta):
     count = 1 << 14
     white = {"type": "diffuse", "reflectance": {"type": "spectrum", "value": 1.0}}
-    film = {"film_ior": 2.2, "film_thickness": 120.0}
-    flat = md.HeightField(np.zeros((300, 300)), 0.08)
-    wide = {"coherence_width": 24.0, "energy_conserving": True}
-    bsdf = load(flat, nested=white, **wide, **GLASS, **film)
+    if passed is under_coat:
+        bsdf = load(FLAT, nested=white, int_ior=1.6, coat_ior=1.4, ext_ior=1.0)
+    else:
+        flat = md.HeightField(np.zeros((300, 300)), 0.08)
+        wide = {"coherence_width": 24.0, "energy_conserving": True}
+        bsdf = load(flat, nested=white, film_ior=2.2, film_thickness=120.0, **wide, **GLASS)
     si = interaction(np.tile(as_single(polar(theta)), (count, 1)), 550.0)
     rng = mi.PCG32(count)
     one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
     weights = np.array(bsdf.sample(mi.BSDFContext(), si, one, two)[1], float)[0]
     cosines = np.sqrt((np.arange(200) + 0.5) / 200)  # equal shares of ∫ cosθ dω
-    filmed = Filmed(1.56, 2.2, 2 * np.pi * 120.0 / 550.0)
-    there, back = (1 - reflectance(c, filmed) for c in (np.cos(np.radians(theta)), cosines))
+    there, back = (passed(c) for c in (np.cos(np.radians(theta)), cosines))
     expected = 1 - there + there * back.mean()
-    # a lobe loses a little below the horizon
+    # a lobe loses a little below the horizon, and the sum over polarisations is not of products
     assert weights.mean() == pytest.approx(expected, abs=0.01)
+    assert weights.mean() < 1.0
+
+
+def test_a_table_that_does_not_reach_the_heights_under_a_coat_is_one_line(some_variant, tmp_path):
+    file = tmp_path / "table.exr"
+    md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(file)
+    plugin = {"type": "diffraction", "filename": str(file), "material": "Al"}
+    mi.load_dict({**plugin, "coat_ior": 1.49, "energy_conserving": False})
+    assert "height_scale_max=1.58" in refusal(lambda: mi.load_dict({**plugin, "coat_ior": 1.58}))
 
 
 def shares(*values: float) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.retired import REPLACED
 from mitsuba_diffraction.settings import SCENE_SETTINGS
 from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.directions import polar, rough_patch
@@ -241,11 +242,6 @@ def test_files_that_are_not_there_or_not_heights(some_variant, tmp_path):
     assert "filename is empty; name a file" in refusal(loads(filename=""))
 
 
-def test_an_image_needs_its_lengths(some_variant, png):
-    assert "pixel_size" in refusal(loads(filename=str(png), max_height=0.1))
-    assert "max_height" in refusal(loads(filename=str(png), pixel_size=0.1))
-
-
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
@@ -319,3 +315,15 @@ def test_an_earlier_name_is_the_current_one_with_a_line(some_variant, table_file
     with pytest.warns(md.DiffractionWarning, match=f"{earlier} is now filename"):
         assert "Diffraction[" in str(load())
     assert "both are given" in refusal(loads(**{earlier: "a.exr", "filename": "b.exr"}))
+
+
+@pytest.mark.parametrize("plugin", ["diffraction", "diffraction_dielectric"])
+@pytest.mark.parametrize(
+    ("name", "value"), [("second_order", True), ("layering", "thesis"), ("diffuse_weight", 0.3)]
+)
+def test_a_retired_parameter_changes_nothing_but_is_named(some_variant, plugin, name, value):
+    plain = md.bsdf_dict(PATCH, plugin, **SMALL)
+    with pytest.warns(md.DiffractionWarning) as heard:
+        bsdf = mi.load_dict(plain | {name: value})
+    assert sum(REPLACED[name] in str(warning.message) for warning in heard) == 1
+    assert str(bsdf) == str(mi.load_dict(plain))

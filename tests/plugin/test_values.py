@@ -1,4 +1,4 @@
-"""What the BSDF returns: its table, reciprocal, nothing below, the lobes where they belong."""
+"""What the BSDF returns: its table, nothing below, the lobes where they belong, an albedo."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import mitsuba_diffraction as md
 from tests.support.directions import polar
 from tests.support.gentle import load, pairs
 from tests.support.lanes import brdf_values, evaluated, interaction, spectra, vectors
+from tests.support.variants import obstacle
 
 
 @pytest.mark.parametrize("basis", ["svd", "chebyshev", "taylor"])
@@ -24,15 +25,6 @@ def test_the_plugin_is_its_table(variant, coherence, basis):
     # exponents are at most 10 times that far from the centre
     assert np.sum(np.abs(value - expected)) < 3e-6 * np.sum(expected)
     assert value == pytest.approx(expected, rel=1e-3, abs=1e-5 * expected.max())
-
-
-def test_reciprocity(variant):
-    wi, wo, lam = pairs()
-    for parameters in ({}, {"int_ior": 1.5}, {"material": "Al"}, {"coherence": "patch"}):
-        bsdf = load(**parameters)
-        there, back = (brdf_values(bsdf, *both, lam[:, None]) for both in ((wi, wo), (wo, wi)))
-        # amplitudes of one place cancel: their phases, of some 100 rad, are known to 6e-6
-        assert there == pytest.approx(back, rel=2e-5 if "coherence" in parameters else 1e-5)
 
 
 def test_nothing_is_reflected_from_or_to_below(variant):
@@ -86,3 +78,34 @@ def test_turning_the_sample_is_turning_the_lamp_and_the_eye_back(variant):
     plain = brdf_values(load(), wi, wo, lam[:, None])
     # directions are rounded to 6e-8 after turning, by up to 1e-5 of a bin
     assert np.sum(np.abs(turned - plain)) < 1e-4 * np.sum(plain)
+
+
+PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.5}}
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"])
+@pytest.mark.parametrize(
+    ("surface", "expected"),
+    [
+        ({"material": "none"}, 1.0),
+        ({"int_ior": 1.5}, 0.04),
+        ({"material": "Al"}, 0.92),
+        ({"int_ior": 1.5, "beneath": PIGMENT}, 0.04 + 0.5 * 0.96**2),
+        ({"int_ior": 1.5, "beneath": {"type": "roughconductor", "alpha": 0.01}}, 1.0),
+    ],
+)
+def test_the_albedo_is_the_same_from_all_sides_and_at_most_1(variant, surface, expected):
+    if reason := obstacle(variant):
+        pytest.skip(reason)
+    mi.set_variant(variant)
+    bsdf = load(**surface)
+    found = np.array(
+        [
+            spectra(bsdf.eval_diffuse_reflectance(interaction(polar(theta), 550.0)))[0]
+            for theta in (0.0, 30.0, 60.0)
+        ]
+    )
+    assert np.all((found >= 0.0) & (found <= 1.0))
+    assert found == pytest.approx(expected, abs=0.01)
+    assert np.ptp(found, axis=0) == pytest.approx(0.0, abs=1e-6)

@@ -1,11 +1,16 @@
-"""Jones matrices of light that goes through: limits, and one model beside the other."""
+"""What surrounds the model: light that goes through, coats, and mirrors at the horizon."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from mitsuba_diffraction.optics.mirror import horizon_correction
 from mitsuba_diffraction.reference import boundary, fresnel, through
+from mitsuba_diffraction.reference.coat import refracted, transmitted
+from mitsuba_diffraction.reference.fresnel import amplitudes
+from mitsuba_diffraction.reference.mirror import solution
+from mitsuba_diffraction.reference.model import small_slope
 from tests.support.directions import polar
 from tests.support.matrices import pairs
 
@@ -13,7 +18,7 @@ MATRICES = (through.small_slope, through.kirchhoff)
 N = 1.5
 
 
-def refracted(wi: np.ndarray) -> np.ndarray:
+def passed(wi: np.ndarray) -> np.ndarray:
     """Where the flat interface sends light along −ωi."""
     tangential = -wi[:, :2] / N
     return np.column_stack([tangential, -np.sqrt(1 - np.sum(tangential**2, axis=1))])
@@ -22,7 +27,7 @@ def refracted(wi: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("matrix", MATRICES)
 def test_in_the_refracted_direction_it_is_fresnel_s(matrix):
     wi, _ = pairs()
-    wo = refracted(wi)
+    wo = passed(wi)
     cos_i, cos_t = wi[:, 2], -wo[:, 2]
     t_s, t_p = 2 * cos_i / (cos_i + N * cos_t), 2 * cos_i / (N * cos_i + cos_t)
     scale = (N * cos_t - cos_i) / (2 * cos_i)
@@ -36,7 +41,7 @@ def test_near_the_refracted_direction_both_agree_cross_terms_included():
     aside = np.random.default_rng(5).normal(size=wi.shape)
     differences = []
     for step in (1e-3, 1e-4):
-        wo = refracted(wi) + step * aside
+        wo = passed(wi) + step * aside
         wo /= np.linalg.norm(wo, axis=1, keepdims=True)
         both = [matrix(wi, wo, N) for matrix in MATRICES]
         differences.append(np.abs(both[0] - both[1]).max())
@@ -63,3 +68,60 @@ def test_a_flat_sheet_lets_through_what_two_mirrors_do(theta):
     powers = np.abs(np.diag(found)) ** 2 * N * cos_t / wi[2]
     single = np.abs(np.stack(fresnel.amplitudes(wi[2], N))) ** 2
     assert powers == pytest.approx((1 - single) / (1 + single), rel=1e-12)
+
+
+def test_refraction_into_a_coat_is_snell_s():
+    for theta in (0.0, 30.0, 80.0):
+        inside = refracted(polar(theta, 70.0), 1.5)
+        assert np.linalg.norm(inside) == pytest.approx(1.0, abs=1e-12)
+        assert 1.5 * np.hypot(*inside[:2]) == pytest.approx(np.sin(np.radians(theta)), abs=1e-12)
+
+
+@pytest.mark.parametrize("index", [0.6 + 4j, 1.3, 2.0])
+@pytest.mark.parametrize("theta", [0.0, 40.0, 80.0])
+def test_a_coat_and_a_mirror_reflect_what_their_bounces_add_up_to(theta, index):
+    wi = polar(theta)
+    inside = refracted(wi, 1.58)[2]
+    found = transmitted(np.diag(amplitudes(inside, index)), wi, wi * [-1, -1, 1], 1.58, index)
+    for n in range(2):
+        face = np.abs(amplitudes(wi[2], 1.58)[n]) ** 2
+        structure = np.abs(amplitudes(inside, index)[n]) ** 2
+        series = sum((1 - face) ** 2 * structure * (face * structure) ** m for m in range(200))
+        assert np.abs(found[n, n]) ** 2 == pytest.approx(series, rel=1e-9)
+
+
+@pytest.mark.parametrize("index", [0.05 + 4j, 0.6 + 4j])
+def test_under_a_coat_no_light_is_gained_whatever_the_structure_does_with_it(index):
+    angles = np.linspace(0.0, 89.9, 60)
+    wi, wo = np.meshgrid(angles, angles)
+    wi, wo = polar(wi.ravel()).T, polar(wo.ravel()).T
+    # all that a mirror would reflect of either polarisation goes to ωo
+    mirror = np.abs(np.stack(amplitudes(refracted(wi, 1.58)[:, 2], index))) ** 2
+    most = np.abs(transmitted(np.ones((len(wi), 2, 2)), wi, wo, 1.58, index)) ** 2
+    face = np.abs(np.stack(amplitudes(wi[:, 2], 1.58))) ** 2
+    for out in range(2):
+        for into in range(2):
+            assert np.all(face[into] + most[:, out, into] * mirror[into] < 1.0 + 1e-9)
+
+
+def test_a_coat_is_reciprocal():
+    wi, wo = polar(60.0, 10.0), polar(30.0, 130.0)
+    below, above = refracted(wi, 1.5), refracted(wo, 1.5)
+    there = transmitted(small_slope(below, above, 0.6 + 4j), wi, wo, 1.5, 0.6 + 4j)
+    back = transmitted(small_slope(above, below, 0.6 + 4j), wo, wi, 1.5, 0.6 + 4j)
+    signs = np.array([[1.0, -1.0], [-1.0, 1.0]])  # reversed light has the other p
+    assert there == pytest.approx(signs * back.T, abs=1e-12)
+
+
+def test_the_fit_at_the_horizon_is_that_of_the_fixed_point():
+    x, c = solution()
+    far, one = np.full_like(x, 99.0), np.float64(1.0)  # C = 1 at the other end
+    fitted = horizon_correction(x**2, far, one)
+    assert np.abs(fitted / c - 1.0).max() < 0.001
+
+
+def test_the_solution_at_the_horizon_is_a_fixed_point():
+    x, c = solution()
+    kernel = np.exp(-((x[:, None] ** 2 - x**2) ** 2) / 4.0) / np.sqrt(np.pi) * x * (x[1] - x[0])
+    # convergence of the iteration
+    np.testing.assert_allclose((c * (kernel @ c))[x < 6.0], 1.0, 1e-6)

@@ -192,11 +192,21 @@ def test_a_small_file_that_claims_gigabytes_is_refused_before_they_are_taken(sav
     refused(saved)
 
 
-def test_a_description_that_is_no_json(saved):
+@pytest.mark.parametrize("text", [b"}", b"[" * 3000, b"9" * 6000], ids=["}", "nests", "digits"])
+def test_a_description_that_is_no_json(saved, text):
     content = saved.read_bytes()
     at = content.index(b'{"version"')
-    saved.write_bytes(content[:at] + b"}" + content[at + 1 :])
-    assert "is no JSON" in refused(saved)
+    assert at + len(text) < len(content) - 1000
+    saved.write_bytes(content[:at] + text + content[at + len(text) :])
+    assert len(refused(saved)) < 500
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_table_whose_coefficients_are_no_powers(saved, value):
+    contents = Contents(saved)
+    next(iter(contents.channels.values()))[3, 4] = value
+    contents.write(saved)
+    assert f"'{saved}' is a damaged table (" in refused(saved)
 
 
 # ------------------------------------------------------------------------ what cannot be written

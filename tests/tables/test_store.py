@@ -42,14 +42,14 @@ def unpack(record):
     return Stored((record.document["text"], *record.arrays))
 
 
-def get(made, memory=None, key=KEY):
+def get(made, memory=None, key=KEY, kind="values"):
     """VALUES with a text, counted in `made` where they are made."""
 
     def make():
         made.append(key)
         return Stored(("a text", VALUES, VALUES[0].astype(np.float16)))
 
-    return cached("values", key, {} if memory is None else memory, make, pack, unpack)
+    return cached(kind, key, {} if memory is None else memory, make, pack, unpack)
 
 
 def test_a_later_process_reads_the_same_numbers(folder):
@@ -93,14 +93,15 @@ def test_any_damage_is_made_again_with_one_line(folder):
         assert file.read_bytes() == content
 
 
-def test_a_file_under_another_s_name_is_made_again(folder):
+@pytest.mark.parametrize(("kind", "key"), [("values", "4" * 64), ("numbers", KEY)])
+def test_a_file_under_another_s_name_is_made_again(folder, kind, key):
     get([])
     (file,) = folder.iterdir()
-    file.rename(folder / file.name.replace("3", "4"))
+    file.rename(folder / f"{kind}-{key[:32]}.cache")
     made = []
     with pytest.warns(DiffractionWarning, match="another's"):
-        get(made, key="4" * 64)
-    assert made == ["4" * 64]
+        get(made, key=key, kind=kind)
+    assert made == [key]
 
 
 @posix

@@ -59,25 +59,6 @@ def test_a_later_process_reads_it_from_disk_under_its_own_name(folder):
     assert np.array_equal(first.coefficients, second.coefficients)
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        Builder(HeightField(PATCH.heights + 1e-9, 0.08)),
-        Builder(HeightField(PATCH.heights, 0.08000001)),
-        Builder(coherence_width=1.7),
-        Builder(coherence_width=1.6, tolerance=1e-4),
-        Builder(coherence_width=1.6, coherence="patch"),
-    ],
-    ids=["heights", "pixel size", "coherence width", "tolerance", "coherence"],
-)
-def test_any_other_content_is_another_table(folder, other):
-    other.built = 0
-    Builder().table()
-    other.table()
-    assert other.built == 1
-    assert len(list(folder.iterdir())) == 2
-
-
 def test_tables_of_another_format_are_built_anew(monkeypatch):
     build = Builder()
     build.table()

@@ -1,4 +1,4 @@
-"""What a table answers: nothing beyond its range, nothing negative; and what it knows of itself."""
+"""What a table answers, at places and in powers too; and what it knows of itself."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionTable, HeightField
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, reference
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from mitsuba_diffraction.tables.build.checks import warnings_of
+from mitsuba_diffraction.tables.powers import as_powers, order_0_power, powers_at
 from tests.support.directions import lit_pairs, polar, rough_patch
-from tests.support.patches import DEFAULTS, PATCH, relative_error
+from tests.support.patches import DEFAULTS, PATCH, WIDTH, relative_error
 
 
 def test_a_table_does_not_guess_outside_its_range():
@@ -81,3 +83,44 @@ def test_the_summary_is_plain_data():
     assert summary["measured_error"]["colours (all other orders)"] == table.error["far"]
     assert summary["source"]["name"] == "rough patch"
     assert "svd power, ensemble" in repr(table)
+
+
+@pytest.mark.parametrize("basis", ["svd", "taylor"])
+def test_a_window_anywhere_is_the_reference_s(basis):
+    table = DiffractionTable.build(PATCH, coherence="patch", basis=basis, **DEFAULTS)
+    wi, wo, lam, near = lit_pairs(PATCH, table.sigma, 300, seed=4)
+    places = np.random.default_rng(0).uniform(-20.0, 20.0, (300, 2))
+    light = {"coherence_width": WIDTH, "coherence": "surface", "place": places}
+    exact = reference.brdf(PATCH, wi, wo, lam, **light)
+    factor = kirchhoff_factor(wi, wo, lam, table.sigma)
+    difference = np.abs(table.brdf(wi, wo, lam, place=places) - exact) / factor
+    for part in (near, ~near):
+        assert difference[part].sum() < table.tolerance * (exact / factor)[part].sum()
+
+
+def test_the_patch_s_own_window_is_on_its_centre():
+    table = DiffractionTable.build(PATCH, coherence="patch", **DEFAULTS)
+    wi, wo, lam, _ = lit_pairs(PATCH, table.sigma, 50, seed=5)
+    centre = 0.5 * np.array(PATCH.extent)
+    # rounding of phases; the patch tiles the plane
+    for place in (centre, centre + 3 * np.array(PATCH.extent)):
+        assert table.brdf(wi, wo, lam, place=place) == pytest.approx(table.brdf(wi, wo, lam), 1e-9)
+
+
+def test_a_table_of_powers_has_no_places():
+    table = DiffractionTable.build(PATCH, **DEFAULTS)
+    with pytest.raises(DiffractionError, match="coherence='patch'"):
+        table.window_sum(0.0, 0.0, 1.0, (0.0, 0.0))
+
+
+def test_a_series_of_powers_is_that_of_the_amplitudes_squared():
+    deep = rough_patch((16, 16), (0.15, 0.15), 0.4)
+    given = {"coherence_width": 2.4, "basis": "taylor", "tolerance": 0.02}
+    table = DiffractionTable.build(deep, **given)
+    powers = as_powers(table)
+    assert powers.expansion.kind == "power" != table.expansion.kind
+    for kappa in table.expansion.kappa_max * np.linspace(0.05, 0.95, 7):
+        exact, found = (powers_at(one, float(kappa)) for one in (table, powers))
+        # 12 terms for 4 rad of an amplitude's phase: below the usual tolerance of a table
+        assert np.abs(found - exact).sum() < 1e-3
+        assert abs(order_0_power(powers, kappa) - order_0_power(table, kappa)) < 1e-4

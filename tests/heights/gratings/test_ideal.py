@@ -1,4 +1,4 @@
-"""Ideal gratings: their extent, axes and refusals; tests of the reference have their orders."""
+"""Ideal gratings: extent, axes, refusals; and what any maker of patches does with any value."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights.gratings import blazed, lamellar, sinusoidal
+from mitsuba_diffraction.heights.gratings import (
+    blazed,
+    cd,
+    dvd,
+    elaphe_like,
+    lamellar,
+    sinusoidal,
+    xenopeltis_like,
+)
 
 
 def test_axis_y_is_the_transpose():
@@ -74,3 +82,30 @@ def test_any_parameters_work_or_are_one_clear_line(make, period, depth, pixels, 
         assert "\n" not in str(error)
     else:
         assert field.range <= depth
+
+
+ALL = ("extent", "pixels", "seed", "depth", "irregularity")
+anything_else = anything | st.lists(st.floats(), max_size=3) | st.just(np.zeros(2))
+
+
+@pytest.mark.parametrize(
+    ("makers", "names", "extent"),
+    [
+        ((elaphe_like, xenopeltis_like), (*ALL, "bending", "roughness", "dirt"), 3.0),
+        ((cd, dvd), (*ALL, "track_pitch"), 5.0),
+    ],
+    ids=["scales", "discs"],
+)
+@given(data=st.data(), value=anything_else)
+def test_any_value_of_other_patches_works_or_is_one_clear_line(makers, names, extent, data, value):
+    make, name = data.draw(st.sampled_from(makers)), data.draw(st.sampled_from(names))
+    arguments = {"extent": extent, "pixels": 16, name: value}
+    if name == "pixels" and isinstance(value, int) and value > 64:
+        return  # allowed, and slow
+    try:
+        make(**arguments)
+    except DiffractionError as error:
+        text = str(error)
+        assert "\n" not in text
+        assert text.startswith(f"{make.__name__}: {name}:")
+        assert "got" in text

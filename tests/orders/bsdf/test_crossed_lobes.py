@@ -166,23 +166,6 @@ def test_a_surface_beneath_gets_the_light_that_is_in_no_order(variant, table):
     assert (both - one).sum() == pytest.approx(beneath.sum(), rel=0.3)
 
 
-def test_a_mix_blends_it(variant, table):
-    wi, wo, _ = near_orders(50, seed=7)
-    si, out = interaction(wi, np.full((len(wi), 4), LAM)), mi.Vector3f(wo.T)
-    parts = {name: md.bsdf_dict(table, coherence_width=WIDTH, orientation=degrees)
-             for name, degrees in (("one", TURN), ("other", 0.0))}  # fmt: skip
-    mix = mi.load_dict({"type": "diffraction_mix", "weight_one": 0.25, **parts})
-    one, other = (mi.load_dict(part).eval(mi.BSDFContext(), si, out) for part in parts.values())
-    found = np.array(mix.eval(mi.BSDFContext(), si, out))
-    assert found == pytest.approx(0.25 * np.array(one) + 0.75 * np.array(other), rel=1e-4)
-
-
-def test_coats_and_films_are_refused(variant, table):
-    for name in ("coat_ior", "film_ior", "height_scale", "lateral_scale"):
-        with pytest.raises(Exception, match=name):
-            load(table, **{name: 1.3})
-
-
 @pytest.mark.parametrize("name", ["llvm_ad_spectral", "llvm_ad_rgb"])
 def test_the_orientation_has_a_derivative(name, table):
     mi.set_variant(name)

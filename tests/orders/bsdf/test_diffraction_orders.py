@@ -11,6 +11,8 @@ import pytest
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.orders import OrderTable
+from tests.orders.blocks import BLOCK, near_orders
+from tests.support import crossed
 from tests.support.directions import polar
 from tests.support.furnace import furnace_in
 from tests.support.orders import (
@@ -81,22 +83,20 @@ def test_light_from_a_listed_direction_is_seen_from_all_directions(some_variant)
 
 
 @pytest.mark.parametrize("component", [0, 1])
-def test_a_component_of_a_sheet_is_the_light_of_its_side(some_variant, component):
+@pytest.mark.parametrize("table", [SHEET, BLOCK], ids=["sheet", "block"])
+def test_a_component_is_the_light_of_its_side(some_variant, table, component):
     wi, wo, samples, wavelength = lit_pairs(40)
     wi, wo = on_all_sides(wi, wo)
-    whole = evaluate(load(SHEET), wi, wo, samples, wavelength)[0]
-    part = evaluate(load(SHEET), wi, wo, samples, wavelength, component)
+    if table is BLOCK:
+        (wi, wo, _), wavelength[:] = near_orders(40), 550.0
+    bsdf = load(table)
+    assert mi.has_flag(bsdf.flags(), mi.BSDFFlags.GlossyTransmission)
+    whole = evaluate(bsdf, wi, wo, samples, wavelength)[0]
+    part = evaluate(bsdf, wi, wo, samples, wavelength, component)
     passed = wi[:, 2] * wo[:, 2] < 0.0
     assert np.array_equal(part[0], np.where((passed == component)[:, None], whole, 0.0))
     sides = part[4][:, 2] * wi[:, 2] < 0.0
     assert np.all(part[5][sides != component] == 0.0)
-
-
-def test_no_bsdf_lies_beneath_a_sheet(some_variant):
-    with pytest.raises(Exception, match="thin sheet") as caught:
-        load(SHEET, beneath={"type": "diffuse"})
-    assert isinstance(caught.value.__cause__ or caught.value, (DiffractionError, RuntimeError))
-    assert mi.has_flag(load(SHEET).flags(), mi.BSDFFlags.GlossyTransmission)
 
 
 def test_a_flat_mirror_keeps_its_light_up_to_the_horizon(some_variant):
@@ -128,16 +128,21 @@ def test_a_mirror_under_a_layer_reflects_what_both_faces_do(some_variant, reflec
 
 
 @pytest.mark.parametrize(
-    ("parameters", "message"),
+    ("table", "parameters", "message"),
     [
-        ({"coherence_width": 2.0}, "periods"),
-        ({"orientations": 1.0}, "orientation"),
-        ({"coat_ior": 1.5}, "is a parameter of the plugin 'diffraction'"),
+        (TABLE, {"coherence_width": 2.0}, "periods"),
+        (TABLE, {"orientations": 1.0}, "orientation"),
+        (TABLE, {"coat_ior": 1.5}, "is a parameter of the plugin 'diffraction'"),
+        (SHEET, {"beneath": {"type": "diffuse"}}, "thin sheet"),
+        (BLOCK, {"beneath": {"type": "diffuse"}}, "block, beneath"),
+        (crossed.table(), {"film_ior": 1.3}, "film_ior"),
+        (crossed.table(), {"height_scale": 1.3}, "height_scale"),
+        (crossed.table(), {"lateral_scale": 1.3}, "lateral_scale"),
     ],
 )
-def test_unfit_parameters_are_refused_in_one_line(some_variant, parameters, message):
+def test_unfit_parameters_are_refused_in_one_line(some_variant, table, parameters, message):
     with pytest.raises(Exception, match=message) as caught:
-        load(TABLE, **parameters)
+        load(table, **parameters)
     assert isinstance(caught.value.__cause__ or caught.value, (DiffractionError, RuntimeError))
 
 

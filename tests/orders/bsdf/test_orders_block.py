@@ -16,9 +16,9 @@ from tests.orders.blocks import (
     STEP,
     WIDTH,
     block_grating,
+    block_light,
     indices,
     near_orders,
-    reference,
 )
 from tests.support.orders import load
 from tests.support.variants import evaluate, interaction
@@ -29,7 +29,7 @@ def test_values_are_the_tables_on_both_sides_in_both_modes_of_transport(some_var
     light = np.full((len(wi), 4), 550.0)
     bsdf = load(BLOCK, coherence_width=WIDTH)
     values = evaluate(bsdf, wi, wo, np.full((len(wi), 3), 0.5), light)
-    expected = reference(wi, wo, orders)
+    expected = block_light(wi, wo, orders)
     ratio = (indices(wi) / indices(wo))[:, 0] ** 2  # radiance over n²
     # half floats, and single precision where lobes are 1e-3 wide
     assert np.abs(values[0][:, 0] - ratio * expected).sum() < 3e-3 * expected.sum()
@@ -69,22 +69,6 @@ def test_samples_are_orders_in_their_directions_and_keep_all_light(
         # half floats
         assert weight == pytest.approx(scale, rel=5e-3)
         assert (wo[:, 2] > 0.0).any() == (tangential < 1.0 or tangential - STEP > -1.0)
-
-
-@pytest.mark.parametrize("component", [0, 1])
-def test_a_component_is_the_light_of_its_side(some_variant, component):
-    wi, wo, _ = near_orders(40)
-    light = np.full((len(wi), 4), 550.0)
-    samples = np.random.default_rng(0).random((len(wi), 3))
-    whole = evaluate(load(BLOCK), wi, wo, samples, light)[0]
-    part = evaluate(load(BLOCK), wi, wo, samples, light, component)
-    passed = wi[:, 2] * wo[:, 2] < 0.0
-    assert np.array_equal(part[0], np.where((passed == component)[:, None], whole, 0.0))
-
-
-def test_no_bsdf_lies_beneath_a_block(some_variant):
-    with pytest.raises(Exception, match="block, beneath"):
-        load(BLOCK, beneath={"type": "diffuse"})
 
 
 #: Thickness of a plate, and the middle of its gratings, 1.6 long, in cm.

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
@@ -29,26 +28,6 @@ def test_a_flat_surface_reflects_s_and_p_of_conical_light_as_fresnel_says():
     truth = np.abs(np.stack(fresnel(np.cos(theta), index))) ** 2
     # 10⁻³ nm of the depth; single precision
     np.testing.assert_allclose(table.polarised_efficiency(x, y, 550.0, 0), truth, atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"theta": 95.0}, "theta 95 must be"),
-        ({"theta": np.arange(80), "phi": np.arange(80), "step": 0.1}, "choose fewer directions"),
-    ],
-)
-def test_light_that_cannot_be_solved_is_refused(options, message):
-    with pytest.raises(DiffractionError, match=message):
-        solve_orders(sinusoidal(0.6, 0.05), "Al", **options)
-
-
-@pytest.mark.parametrize("material", ["Al", 1.5])
-def test_fewer_harmonics_than_orders_are_refused(material):
-    with pytest.raises(DiffractionError, match="resolution of at least 14"):
-        solve_orders(
-            sinusoidal(8.0, 0.06), material, theta=0.0, settings=replace(GREEN, resolution=12)
-        )
 
 
 def test_efficiencies_of_one_direction_are_those_solved():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError, HeightField
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve import crossed
 from mitsuba_diffraction.orders.solve.crossed import CrossedWaves
@@ -119,20 +119,6 @@ def test_lumps_have_the_orders_of_ikarus():
         truth = np.mean([float(each.R_orders[each.order_index(-m, -n)]) for each in solved])
         # its 8 slices are within 3 % of 16
         assert share == pytest.approx(truth, rel=0.05, abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("field", "arguments", "message"),
-    [
-        (HeightField(np.zeros((4, 4)), 2.0), {}, "four times the shortest wavelength"),
-        (HeightField(np.zeros((4, 4)), 0.1), {"material": "none"}, "perfect conductors"),
-        (HeightField(np.zeros((4, 4)), 0.1), {"material": "glas"}, "material"),
-        (HeightField(np.zeros((4, 4)), 0.1), {"material": 1.5, "thin": True}, "leave out"),
-    ],
-)
-def test_what_is_not_solved_is_refused(field, arguments, message):
-    with pytest.raises(DiffractionError, match=message):
-        md.solve_orders(field, **arguments)
 
 
 def test_an_interrupted_solution_goes_on(tmp_path):

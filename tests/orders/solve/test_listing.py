@@ -6,12 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.io import netcdf_file
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.listing import list_orders
-from mitsuba_diffraction.orders.lists import read_efficiencies
 from mitsuba_diffraction.reference.model import small_slope
 from tests.support.orders import listed_grating, shallow_grating, thin_grating
 
@@ -109,7 +107,7 @@ def test_jones_matrices_of_order_0_are_fresnel_s():
     assert np.abs(jones[:, [0, 1], [1, 0]]).max() < 2e-3
 
 
-def test_jones_matrices_have_the_efficiencies_of_s_and_p_and_come_back_from_netcdf(tmp_path):
+def test_jones_matrices_have_the_efficiencies_of_s_and_p():
     table = shallow_grating(0.97 + 6.4j, 0.1)
     light = ([520.0, 560.0], [0.0, 40.0], [0.0, 60.0])
     listing = list_orders(table, *light, jones=True)
@@ -123,21 +121,8 @@ def test_jones_matrices_have_the_efficiencies_of_s_and_p_and_come_back_from_netc
     listed = listing.rows[listing.rows[:, 1] > 0.0, listing.columns.index("J_sp_re")]
     assert np.abs(listed).max() > 1e-3
     np.testing.assert_allclose(listed, crossing.real, atol=1e-9)
-    listing.save(tmp_path / "jones.nc")
-    with netcdf_file(tmp_path / "jones.nc", mmap=False) as file:
-        axes = [file.variables[name][:] for name in ("wavelength", "theta", "phi", "order")]
-        values = file.variables["J_pp_im"][:]
-    places = tuple(np.searchsorted(a, c) for a, c in zip(axes, listing.rows.T[:4], strict=True))
-    np.testing.assert_array_equal(values[places], listing.rows[:, listing.columns.index("J_pp_im")])
     with pytest.raises(DiffractionError, match="polarised"):
         list_orders(thin_grating(0.6, counts=(2, 2, 1)), 550.0, 0.0, jones=True)
-
-
-def test_efficiencies_in_netcdf_are_read_as_a_list(tmp_path):
-    listing = list_orders(thin_grating(0.6, counts=(2, 2, 1)), [500.0, 550.0], [0.0, 40.0])
-    listing.save(tmp_path / "list.nc")
-    grid = read_efficiencies(tmp_path / "list.nc")
-    assert np.nansum(grid.values) == pytest.approx(listing.rows[:, 4:].sum())
 
 
 @pytest.mark.parametrize(
@@ -149,7 +134,8 @@ def test_efficiencies_in_netcdf_are_read_as_a_list(tmp_path):
     ],
 )  # fmt: skip
 def test_light_outside_the_directions_of_a_list_is_warned_of(theta, phi, nearest):
+    table = listed_grating()  # warns of its directions itself
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        list_orders(listed_grating(), 580.0, theta, phi)
+        list_orders(table, 580.0, theta, phi)
     assert [nearest in str(each.message) for each in caught] == [True] * (nearest is not None)

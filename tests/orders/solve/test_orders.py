@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction import DiffractionError, HeightField
 from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve import node_counts, orders
 from mitsuba_diffraction.orders.solve.accuracy import measured_error
@@ -33,6 +33,13 @@ PROFILE = sinusoidal(0.5, 0.05)
 LOOP = np.array([[0, 0.8, 0.5, 0.5], [0, 0.5, -0.5, 1.0]])
 SPIKE = np.array([[0, 0.4, 0.4, 0.4, 0.9], [0, 0, 0.1, 0, 0]])
 SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.1, polarised=True)
+COARSE = Settings(wavelengths=(550.0, 550.0), resolution=12)
+WALLS, MANY = lamellar(0.8, 0.1, 0.3), np.arange(80)
+
+
+def flat(pixel_size):
+    """A flat cell of a crossed grating."""
+    return HeightField(np.zeros((4, 4)), pixel_size)
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +123,32 @@ def test_the_error_compares_with_new_solutions(table):
         (lambda: md.solve_orders(lamellar(1.0, 90.0)), "lengths are in µm"),
         (lambda: md.solve_orders(lamellar(900.0, 0.1)), "directions of light alone"),
         (lambda: md.solve_orders("cd.toml"), "expected a profile"),
+        # listed light
+        (lambda: md.solve_orders(PROFILE, "Al", theta=95.0), "theta 95 must be"),
+        (lambda: md.solve_orders(PROFILE, "Al", theta=MANY, phi=MANY, step=0.1),
+         "choose fewer directions"),
+        (lambda: md.solve_orders(sinusoidal(8.0, 0.06), "Al", theta=0.0, settings=COARSE),
+         "resolution of at least 14"),
+        (lambda: md.solve_orders(sinusoidal(8.0, 0.06), 1.5, theta=0.0, settings=COARSE),
+         "resolution of at least 14"),
+        # thin sheets and blocks
+        (lambda: md.solve_orders(WALLS, "Al", thin=True), "clear"),
+        (lambda: md.solve_orders(WALLS, "none", thin=True), "clear"),
+        (lambda: md.solve_orders(WALLS, "1.5+0.1i", thin=True), "clear"),
+        (lambda: md.solve_orders(WALLS, "1.005", thin=True), "1.01"),
+        (lambda: md.solve_orders(WALLS, "1.5", thin=True, superstrate=1.3), "both sides"),
+        (lambda: md.solve_orders(WALLS, "Al", block=True), "clear"),
+        (lambda: md.solve_orders(WALLS, "1.5+0.1i", block=True), "clear"),
+        (lambda: md.solve_orders(WALLS, "6", block=True), "1.01 to 5"),
+        (lambda: md.solve_orders(WALLS, "1.5", settings=Settings(method="integral"), block=True),
+         "coupled"),
+        (lambda: md.solve_orders(WALLS, "1.5", settings=Settings(polarised=True), block=True),
+         "efficiencies alone"),
+        # crossed gratings
+        (lambda: md.solve_orders(flat(2.0)), "four times the shortest wavelength"),
+        (lambda: md.solve_orders(flat(0.1), "none"), "perfect conductors"),
+        (lambda: md.solve_orders(flat(0.1), "glas"), "material"),
+        (lambda: md.solve_orders(flat(0.1), 1.5, thin=True), "leave out"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_solved_is_refused_in_one_line(make, message):

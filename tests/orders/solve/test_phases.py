@@ -156,26 +156,3 @@ def test_saved_light_keeps_its_phases_and_other_light_says_that_it_has_none(tmp_
         listing = list_orders(loaded, *light, jones=True)
         assert not listing.rows[:, listing.columns.index(WITH_PHASE)].any()
         assert np.abs(listing.rows[:, listing.columns.index("J_ss_im")]).max() < 1e-12
-
-
-def test_a_csv_of_jones_matrices_has_the_shares_of_s_and_p(tmp_path):
-    """Read by NumPy, of conical light that was solved: |J|² are the printed shares."""
-    settings = Settings((550.0, 550.0), polarised=True, resolution=12)
-    table = solve_orders(sinusoidal(0.9, 0.2), "Al", theta=30.0, phi=50.0, settings=settings)
-    for options in ({"jones": True}, {"polarised": True}):
-        list_orders(table, 550.0, 30.0, 50.0, **options).save(
-            tmp_path / f"{next(iter(options))}.csv"
-        )
-    matrices, shares = (
-        np.genfromtxt(tmp_path / f"{name}.csv", delimiter=",", names=True)
-        for name in ("jones", "polarised")
-    )
-    assert len(matrices) > 2
-    np.testing.assert_array_equal(matrices["order"], shares["order"])
-    assert (matrices["has_phase"] == 1).all()
-    for came in "sp":
-        power = sum(
-            matrices[f"J_{left}{came}_{part}"] ** 2 for left in "sp" for part in ("re", "im")
-        )
-        # single precision
-        np.testing.assert_allclose(power, shares[f"R_{came}"], rtol=1e-4, atol=1e-7)

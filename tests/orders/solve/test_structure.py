@@ -1,24 +1,21 @@
-"""Layers and slices beneath profiles, beside transfer matrices, another solver and themselves."""
+"""Films on profiles and layers beneath: transfer matrices, other solvers, and themselves."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from docs.make.validation.light import light_on, powers_of
-from docs.make.validation.stacks import (
-    BENEATH,
-    MIRROR,
-    RIDGES,
-    by_ikarus,
-    quarter_wave_reflectance,
-)
+from docs.make.validation.stacks import BENEATH, MIRROR, RIDGES, by_ikarus
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.films import read_layers, structure_of
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import AUTO, Jobs, problem_of, solver_of
-from mitsuba_diffraction.orders.solve.profiles import lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.resolution import places_to_test, resolved
 from mitsuba_diffraction.orders.solve.stations import Grating, reversed_light
 
@@ -28,6 +25,9 @@ SLICES = (
     (0.06, ("chitin", 0.05, 0.3), ("1.9+0.2i", 0.3, 0.35)),
     (0.09, ("chitin", 0.42, 0.58)),
 )
+#: Protected aluminium with a high and a low index; µm.
+LAYERS = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
+SUPERSTRATE = 1.2
 
 
 def grating(profile, material="1.46", superstrate=1.0, **media):
@@ -38,6 +38,11 @@ def grating(profile, material="1.46", superstrate=1.0, **media):
     return Grating(profile, substance, superstrate, limits, structure=structure)
 
 
+def filmed(profile, layers=LAYERS, material="Al"):
+    """A grating with films, under another medium than air."""
+    return grating(profile, material, SUPERSTRATE, layers=layers)
+
+
 def efficiencies(surface, harmonics, theta, wavelength):
     """Efficiencies (2,) of s and p light by order, of light across the grooves."""
     solver = solver_of(problem_of(surface, AUTO, harmonics))
@@ -45,8 +50,11 @@ def efficiencies(surface, harmonics, theta, wavelength):
 
 
 def solved(surface, harmonics, place=(1, 0, 0.35, 0.5), w=(0.5,)):
-    solver = CoupledWaves(surface.profile, harmonics, surface.structure)
-    return solver.amplitudes(surface.station(*place, w))
+    return at_station(surface, surface.station(*place, w), harmonics)
+
+
+def at_station(surface, station, harmonics):
+    return CoupledWaves(surface.profile, harmonics, surface.structure).amplitudes(station)
 
 
 def test_layers_over_and_beneath_a_flat_surface_reflect_as_transfer_matrices_say():
@@ -63,17 +71,6 @@ def test_layers_over_and_beneath_a_flat_surface_reflect_as_transfer_matrices_say
             tmm.coh_tmm(name, indices, depths, np.radians(theta), lam)["R"] for name in "sp"
         ]
         assert np.allclose(got, expected, atol=1e-9)  # rounding
-
-
-def test_a_quarter_wave_stack_reflects_as_its_closed_form_says():
-    """Born and Wolf, Principles of Optics, section 1.6.5, for N double layers on an index."""
-    low, high, pairs, lam = 1.46, 2.35, 5, 550.0
-    beneath = [(high, 1e-3 * lam / 4 / high), *[
-        (low, 1e-3 * lam / 4 / low), (high, 1e-3 * lam / 4 / high)
-    ] * pairs]  # fmt: skip
-    surface = grating(lamellar(PERIOD, 0.0), "1.52", beneath=beneath)
-    got = efficiencies(surface, 2, 1e-3, lam)[0]
-    assert np.allclose(got, quarter_wave_reflectance(low, high, 1.52, pairs), atol=1e-8)
 
 
 def test_a_grating_on_a_mirror_has_the_efficiencies_of_ikarus():
@@ -104,11 +101,23 @@ def test_a_substrate_of_the_material_and_a_layer_of_it_change_nothing():
     assert np.allclose(solved(bare, 8), solved(same, 8), atol=1e-9)
 
 
-def test_light_on_slices_is_reciprocal():
-    surface = grating(lamellar(PERIOD, 0.0), "melanin", beneath=SLICES)
-    there, back = (solved(surface, 20, (1, 0, tau, 0.5)) for tau in (0.3, 0.7))
-    # harmonics are cut at other frequencies: 1e-2 with 8
-    assert np.abs(there - reversed_light(back)).max() < 3e-3
+@pytest.mark.parametrize(
+    ("solver", "surface", "harmonics", "error"),
+    [
+        # harmonics are cut at other frequencies: 0.05 with 8 of them on slopes, 0.0035 with 30
+        (CoupledWaves, filmed(lamellar(PERIOD, 0.1)), 20, 0.02),
+        (CoupledWaves, filmed(blazed(PERIOD, 0.1)), 20, 0.02),
+        # harmonics beside the vertical wall
+        (Chandezon, filmed(blazed(PERIOD, 0.1)), 24, 5e-3),
+        # 1e-2 with 8
+        (CoupledWaves, grating(lamellar(PERIOD, 0.0), "melanin", beneath=SLICES), 20, 3e-3),
+    ],
+    ids=["walls", "slope", "slope by Chandezon", "slices"],
+)
+def test_light_is_reciprocal(solver, surface, harmonics, error):
+    waves = solver(surface.profile, harmonics, surface.structure)
+    there, back = (waves.amplitudes(surface.station(1, 0, tau, 0.5, (0.5,))) for tau in (0.3, 0.7))
+    assert np.abs(there - reversed_light(back)).max() < error
     assert (np.abs(there) ** 2).sum(axis=(3, 4)).max() < 1
 
 
@@ -145,11 +154,20 @@ def test_the_structure_identifies_a_problem():
         ({"beneath": [("Alu", 0.2)]}, "did you mean Al"),
         ({"layers": [(0.1, ("1.5", 0.3, 0.7))]}, "slices lie beneath a profile"),
         ({"substrate": "none"}, "substrate: .*perfect conductor"),
+        ({"layers": [("1.46", 0.0)]}, "layer 1: thickness"),
+        ({"layers": [("1.4", 0.1), ("Unobtainium", 1)]}, "is unknown"),
+        ({"layers": [("none", 0.1)]}, "layer 1: .*perfect conductor"),
+        ({"layers": LAYERS, "material": "none"}, "not thin sheets or perfect"),
     ],
 )
 def test_impossible_structures_are_refused(media, message):
     with pytest.raises(DiffractionError, match=message):
         grating(lamellar(PERIOD, 0.1), **media)
+
+
+def test_films_are_not_solved_by_the_integral_method():
+    with pytest.raises(DiffractionError, match="method=coupled"):
+        problem_of(filmed(blazed(PERIOD, 0.1)), "integral", 20)
 
 
 def test_a_grating_of_the_medium_above_is_refused():
@@ -159,3 +177,62 @@ def test_a_grating_of_the_medium_above_is_refused():
         problem = problem_of(surface, "coupled", 8)
         with pytest.raises(DiffractionError, match="reflects no light"):
             resolved(problem, Jobs(), places_to_test(range(2)), 0.01)
+
+
+@pytest.mark.parametrize("solver", [CoupledWaves, Chandezon])
+def test_flat_stacks_reflect_as_transfer_matrices_say(solver):
+    tmm = pytest.importorskip("tmm")
+    surface = filmed(lamellar(0.5, 0.0) if solver is CoupledWaves else sinusoidal(0.5, 1e-9))
+    station = surface.station(1, 0, 0.35, 0.5, [0.2, 0.9])
+    amplitudes = solver(surface.profile, 3, surface.structure).amplitudes(station)
+    for n, lam in enumerate(station.wavelengths * SUPERSTRATE * 1e3):
+        y, c = station.along[n], np.sqrt(1 - station.along[n] ** 2)
+        indices = [
+            SUPERSTRATE, *(f.material.index(lam)[()] for f in reversed(surface.structure.films)),
+            surface.material.index(lam)[()],
+        ]  # fmt: skip
+        depths = [np.inf, *(1e3 * f.thickness for f in reversed(surface.structure.films)), np.inf]
+        for channel, sine in enumerate(station.sines):
+            theta = np.arcsin(np.hypot(c * sine, y))
+            powers = [tmm.coh_tmm(name, indices, depths, theta, lam)["R"] for name in "sp"]
+            row = (np.abs(amplitudes[n, channel, :, channel]) ** 2).sum()
+            # rounding; both polarisations together, since axes along the grooves are not s and p
+            assert row == pytest.approx(sum(powers), abs=1e-9)
+
+
+def test_a_film_of_the_material_is_a_higher_profile():
+    """And one of the medium above is none."""
+    profile = lamellar(0.5, 0.1)
+    bare, same = filmed(profile, []), filmed(profile, [("Al", 0.07)])
+    station = bare.station(1, 0, 0.35, 0.5, [0.2])
+    coated = replace(station, media=same.station(1, 0, 0.35, 0.5, [0.2]).media)
+    difference = np.abs(at_station(bare, station, 12)) - np.abs(at_station(same, coated, 12))
+    assert np.abs(difference).max() < 1e-9
+    air = filmed(profile, [(str(SUPERSTRATE), 0.07)])
+    aired = replace(station, media=air.station(1, 0, 0.35, 0.5, [0.2]).media)
+    difference = at_station(bare, station, 12) - at_station(air, aired, 12)
+    assert np.abs(difference).max() < 1e-9
+
+
+def test_two_solvers_agree_on_films_on_a_slope():
+    surface = filmed(sinusoidal(0.6, 0.1), [("2.0", 0.08), ("1.38", 0.1)], material="1.6")
+    station = surface.station(1, 0, 0.45, 0.5, [0.2])
+    coarse, fine = (at_station(surface, station, harmonics) for harmonics in (8, 16))
+    chandezon = Chandezon(surface.profile, 8, surface.structure).amplitudes(station)
+    # phases too: steps in place of the slope miss 0.014 and 0.007, as 1/steps
+    assert np.abs(2 * fine - coarse - chandezon).max() < 2e-3
+
+
+@pytest.mark.parametrize("profile", [sinusoidal(0.6, 0.1), blazed(0.6, 0.1)], ids=("sine", "blaze"))
+def test_films_move_a_profile(profile):
+    """Light sees only a film that it does not pass, and no film of the medium above."""
+    bare, thick = filmed(profile, []), filmed(profile, [("Al", 0.3)], material="1.5")
+    station = bare.station(1, 0, 0.35, 0.5, [0.5])
+    same = thick.station(1, 0, 0.35, 0.5, [0.5])
+    expected = Chandezon(profile, 12).amplitudes(station)
+    got = Chandezon(profile, 12, thick.structure).amplitudes(same)
+    # e⁻⁴⁵ of the light reaches the glass; phases are those of a moved profile
+    assert np.abs(np.abs(got) - np.abs(expected)).max() < 1e-6
+    air = filmed(profile, [(str(SUPERSTRATE), 0.07)])
+    aired = replace(station, media=air.station(1, 0, 0.35, 0.5, [0.5]).media)
+    assert np.abs(Chandezon(profile, 12, air.structure).amplitudes(aired) - expected).max() < 1e-6

@@ -57,16 +57,6 @@ def test_light_beyond_its_wavelengths_is_not_reflected(table):
     assert table.efficiency(0.0, 0.0, far, 0, 0) == 0.0
 
 
-@pytest.mark.parametrize("make", [crossed.table, crossed.clear_table])
-def test_a_file_keeps_it(make, tmp_path):
-    table = make()
-    table.save(tmp_path / "crossed.nc")
-    kept = OrderTable.load(tmp_path / "crossed.nc")
-    assert kept.periods == table.periods
-    assert dict(kept.header) == dict(table.header)
-    assert kept.digest() == table.digest()
-
-
 @pytest.mark.parametrize("place", [0.3, 0.6, 0.9])
 @pytest.mark.parametrize("cut", [False, True])
 def test_a_damaged_file_is_refused(table, tmp_path, place, cut):

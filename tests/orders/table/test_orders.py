@@ -1,8 +1,9 @@
-"""Tables of orders: look-up between nodes, energy, reciprocity, and refusals."""
+"""Tables of orders: look-up between nodes, energy, reciprocity, files, and refusals."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -13,9 +14,20 @@ from mitsuba_diffraction.orders.cells import Counts
 from mitsuba_diffraction.orders.rows import Kind, rows, wavelength_of
 from mitsuba_diffraction.orders.table import MARGIN
 from mitsuba_diffraction.reference.fresnel import reflectance
-from tests.support.orders import thin_grating
+from tests.orders.blocks import BLOCK
+from tests.support import crossed
+from tests.support.orders import shallow_grating, thin_grating
 
 GRATING = thin_grating()
+#: Tables of every kind.
+KINDS: dict[str, Callable[[], OrderTable]] = {
+    "grooves": lambda: GRATING,
+    "sheet": lambda: thin_grating(0.9, counts=Counts(5, 4, 2), thin=True),
+    "block": lambda: BLOCK,
+    "polarised": lambda: shallow_grating(0.9 + 6.0j, 0.1),
+    "crossed": crossed.table,
+    "crossed, clear": crossed.clear_table,
+}
 
 
 def light(n=200, seed=1):
@@ -115,13 +127,15 @@ def test_wavelengths_outside_hold_the_end_values():
     assert np.isfinite(GRATING.efficiency(0.3, 0.2, [300.0, 900.0], [0, 1])).all()
 
 
-def test_files_keep_tables(tmp_path):
-    path = tmp_path / "grating.nc"
-    GRATING.save(path)
+@pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
+def test_files_keep_tables(make, tmp_path):
+    table, path = make(), tmp_path / "grating.nc"
+    table.save(path)
     loaded = OrderTable.load(path)
-    assert (loaded.period, loaded.wavelengths) == (GRATING.period, GRATING.wavelengths)
-    assert dict(loaded.header) == dict(GRATING.header)
-    assert loaded.digest() == GRATING.digest()
+    for name in ("periods", "wavelengths", "superstrate", "thin", "block", "polarised"):
+        assert getattr(loaded, name) == getattr(table, name)
+    assert dict(loaded.header) == dict(table.header)
+    assert loaded.digest() == table.digest()
     again = tmp_path / "again.nc"
     loaded.save(again)
     assert again.read_bytes() == path.read_bytes()

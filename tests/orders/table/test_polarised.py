@@ -62,15 +62,6 @@ def test_reversed_light_has_the_transposed_matrix(m):
     assert back == pytest.approx(expected, abs=1e-5)  # single precision
 
 
-def test_files_keep_the_matrices(tmp_path):
-    path = tmp_path / "grating.nc"
-    GRATING.save(path)
-    loaded = OrderTable.load(path)
-    assert loaded.polarised
-    assert loaded.summary()["polarised"]
-    assert loaded.digest() == GRATING.digest()
-
-
 def test_tables_without_matrices_and_matrices_of_other_efficiencies_are_refused():
     with pytest.raises(DiffractionError, match="polarised=True"):
         OrderTable.mirror(0.6).mueller(0.0, 0.0, 550.0, 0)

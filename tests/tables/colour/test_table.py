@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, DiffractionWarning, HeightField
-from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.tables.colour import table as colour_table
 from mitsuba_diffraction.tables.colour.table import ColourTable, cached_colours
@@ -56,7 +57,8 @@ QUICK = "small"
 def test_colours_are_the_integral_over_wavelengths(case: str) -> None:
     heights, arguments = CASES[case]
     table = DiffractionTable.build(**{"heights": heights, "coherence_width": WIDTH, **arguments})
-    colours = cached_colours(table)
+    cached_colours(table)
+    colours = cached_colours(replace(table))  # of another table of the same content: from the disk
     u, v, w = directions(120)
     expected, found = integral(table, u, v, w), colours.colour(u, v, w)
     away = np.hypot(u, v) > 3.0 * colours.radius_end / 4.5
@@ -87,16 +89,6 @@ def test_a_mirror_reflects_white() -> None:
     ring = 2.0 * np.pi * radius[:, None] * found
     albedo = 4.0 * np.pi * table.sigma**2 * np.trapezoid(ring, radius, axis=0)
     assert albedo == pytest.approx(np.ones(3), abs=1e-3)  # linear between 256 radii
-
-
-@pytest.mark.thorough
-def test_spectral_colours_stay_outside_the_displays_gamut() -> None:
-    heights = gratings.blazed(period=2.0, depth=0.25, periods=6, rows=8)
-    colours = ColourTable.build(DiffractionTable.build(heights, coherence_width=12.0))
-    u = np.linspace(0.2, 0.35, 100)  # order 1, from 400 to 700 nm
-    found = colours.colour(u, 0.0 * u, np.full(u.shape, 1.9))
-    # the sRGB red of 500 nm light is −0.36 times its green
-    assert found[:, 0].min() < -0.2 * found[:, 1].max()
 
 
 @pytest.mark.thorough

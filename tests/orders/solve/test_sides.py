@@ -1,4 +1,4 @@
-"""Thin sheets: both solvers on both sides, Fresnel's sheet, energy, reciprocity, and tables."""
+"""Thin sheets and blocks: two solvers on both sides, Fresnel, energy, reciprocity, and tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
@@ -133,22 +133,6 @@ def test_a_sheet_is_solved_into_a_table():
         assert np.sum(sums, axis=0) == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"material": "Al"}, "clear"),
-        ({"material": "none"}, "clear"),
-        ({"material": "1.5+0.1i"}, "clear"),
-        ({"material": "1.005"}, "1.01"),
-        ({"material": "1.5", "superstrate": 1.3}, "both sides"),
-    ],
-)
-def test_what_is_no_clear_sheet_is_refused_in_one_line(arguments, message):
-    with pytest.raises(DiffractionError, match=message) as caught:
-        md.solve_orders(WALLS, thin=True, **arguments)
-    assert "\n" not in str(caught.value)
-
-
 def test_the_first_resolution_has_the_orders_within_the_material():
     """73 of them, and 19 outside."""
     profile = lamellar(5.0, 0.1)
@@ -156,3 +140,60 @@ def test_the_first_resolution_has_the_orders_within_the_material():
     light = surface.station(17, 0, 0.3, 0.5, [0.5])
     waves = CoupledWaves(profile, coarsest(problem_of(surface, "coupled", 0)))
     assert np.allclose((np.abs(waves.amplitudes(light)) ** 2).sum(axis=(3, 4)), 1.0, atol=1e-6)
+
+
+#: Wavelengths, index and settings of blocks.
+GREEN, BLOCK = (500.0, 560.0), 1.5
+SETTINGS = Settings(GREEN, tolerance=0.1, resolution=4)
+
+
+def sums(table, x, y, lam, from_below):
+    """Reflected and transmitted light of all orders."""
+    sides = [
+        sum(
+            table.efficiency(x, y, lam, m, from_below=from_below, transmitted=transmitted)
+            for m in range(-4, 5)
+        )
+        for transmitted in (False, True)
+    ]
+    return np.array(sides)
+
+
+def light(n, radius):
+    """Tangential parts over 2π/λ within a radius, and wavelengths."""
+    rng = np.random.default_rng(2)
+    r, azimuth = radius * np.sqrt(rng.random(n)), 2.0 * np.pi * rng.random(n)
+    return r * np.cos(azimuth), r * np.sin(azimuth), rng.uniform(*GREEN, n)
+
+
+def test_a_flat_face_is_fresnel_s_from_both_sides_with_total_reflection():
+    table = solve_orders(lamellar(0.4, 1e-7), BLOCK, settings=SETTINGS, block=True)
+    for from_below, radius in ((False, 0.995), (True, BLOCK - 0.005)):
+        x, y, lam = light(300, radius)
+        above = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+        expected = face_transmittance(above, BLOCK)
+        assert (expected == 0.0).any() == from_below
+        reflected, transmitted = sums(table, x, y, lam, from_below)
+        # single precision; exact at the critical angle too
+        assert np.abs(transmitted - expected).max() < 1e-5
+        assert np.abs(reflected + transmitted - 1.0).max() < 1e-6
+        alone = table.efficiency(x, y, lam, 0, from_below=from_below, transmitted=True)
+        assert np.abs(alone - expected).max() < 1e-5
+
+
+def test_a_block_keeps_all_light_and_sends_it_back_as_it_came():
+    table = solve_orders(lamellar(0.4, 0.05, 0.3), BLOCK, settings=SETTINGS, block=True)
+    assert table.sides == 2
+    # single precision
+    assert table.reciprocity < 1e-5
+    for from_below, radius in ((False, 0.99), (True, 1.48)):
+        reflected, transmitted = sums(table, *light(200, radius), from_below)
+        assert np.abs(reflected + transmitted - 1.0).max() < 1e-6
+        # some light beyond the critical angle leaves by the grating
+        assert transmitted.min() < 0.7 * transmitted.max()
+    x, y, lam = 1.2, 0.1, 530.0
+    step = lam / 400.0
+    there = table.efficiency(x, y, lam, -1, from_below=True, transmitted=True)
+    back = table.efficiency(step - x, -y, lam, -1, transmitted=True)
+    assert there == pytest.approx(back, rel=1e-3)
+    assert there > 0.005

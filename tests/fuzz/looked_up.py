@@ -1,4 +1,4 @@
-"""Tables that may be damaged: loaded and looked up in NumPy and the plugin, by a child process."""
+"""Tables that may be damaged: loaded and looked up in NumPy and the plugin."""
 
 from __future__ import annotations
 
@@ -9,36 +9,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError, DiffractionTable
+from mitsuba_diffraction import DiffractionTable
 from tests.support.lanes import evaluated
 
 #: LLVM, where reading outside of an array is no error but may end the process, compiles for each
-#: table: it has its turn now and then.
+#: table: of so many tables one has its turn.
 _COMPILED = 40
-_count = 0
-
-
-def start() -> None:
-    """What takes a while when it is first used."""
-    mi.set_variant("scalar_spectral")
-
-
-def use(path: Path) -> tuple[str, dict[str, Any]] | None:
-    """Digest and source of a table whose values are sane, or None if it is refused in one line."""
-    global _count
-    try:
-        table = DiffractionTable.load(path)
-    except DiffractionError as error:
-        assert "\n" not in str(error)
-        assert len(str(error)) < 500
-        return None
-    _count += 1
-    _check_window_sums(table)
-    use_table(path)
-    if _count % _COMPILED == 0:
-        _check_compiled(path)
-    return table.digest(), dict(table.source)
 
 
 def _check_window_sums(table: DiffractionTable) -> None:
@@ -54,32 +30,37 @@ def _check_window_sums(table: DiffractionTable) -> None:
 
 def _check_compiled(path: Path) -> None:
     mi.set_variant("llvm_ad_spectral")
-    scene = {"type": "diffraction", "filename": str(path), "energy_conserving": False}
     rng = np.random.default_rng(1)
     tangential = rng.uniform(-0.7, 0.7, (2, 64, 2))
     wi, wo = (np.c_[uv, np.sqrt(1.0 - (uv**2).sum(axis=1))] for uv in tangential)
-    try:
-        bsdf = mi.load_dict({**scene, "material": "none"})
-    except RuntimeError as error:
-        assert "DiffractionError: " in str(error), str(error)[-200:]
-        return
-    value = evaluated(bsdf, wi, wo, rng.uniform(360.0, 830.0, (64, 4)))
+    value = evaluated(_loaded(path), wi, wo, rng.uniform(360.0, 830.0, (64, 4)))
     assert np.isfinite(value).all()
     assert (value >= 0.0).all()
     assert value.max() < 1e9
 
 
-def use_table(path: Path) -> None:
-    table = md.DiffractionTable.load(path)
+def use_table(path: Path) -> DiffractionTable:
+    """A table whose values are sane; a DiffractionError if it is refused."""
+    table = DiffractionTable.load(path)
+    _check_window_sums(table)
     _look_up(table)
     mi.set_variant("scalar_spectral")  # where reading outside of an array is an error
+    bsdf = _loaded(path)
+    if bsdf is not None:
+        look_up_in_plugin(bsdf)
+        if int(table.digest(), 16) % _COMPILED == 0:
+            _check_compiled(path)
+    return table
+
+
+def _loaded(path: Path) -> Any:
+    """The plugin with a table, or None if it refuses it."""
     scene = {"type": "diffraction", "filename": str(path), "energy_conserving": False}
     try:
-        bsdf = mi.load_dict({**scene, "material": "none"})
+        return mi.load_dict({**scene, "material": "none"})
     except RuntimeError as error:
         assert "DiffractionError: " in str(error), str(error)[-200:]
-        return
-    look_up_in_plugin(bsdf)
+        return None
 
 
 def look_up_in_plugin(bsdf: Any) -> None:
@@ -98,7 +79,7 @@ def look_up_in_plugin(bsdf: Any) -> None:
         assert numbers[:4].max() < 1e9, "too bright in the plugin"
 
 
-def _look_up(table: md.DiffractionTable) -> None:
+def _look_up(table: DiffractionTable) -> None:
     rng = np.random.default_rng(1)
     wi, wo = rng.normal(size=(2, 16, 3))
     for w in (wi, wo):

@@ -1,18 +1,24 @@
-"""Tables of blocks: light on both sides of a face, files, and what they refuse."""
+"""Tables of blocks and thin sheets: light on both sides, and what they refuse."""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.coat import face_transmittance
-from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
+from mitsuba_diffraction.orders.cells import Counts
 from mitsuba_diffraction.orders.listing import list_orders
 from tests.orders.blocks import BLOCK, INDEX
-from tests.support.orders import thin_grating
+from tests.support.orders import SHARES, thin_grating
+
+COUNTS = Counts(5, 4, 2)
+SHEET = thin_grating(0.9, counts=COUNTS, thin=True)
+SIDES = tuple(itertools.product((False, True), (False, True)))
 
 
 def orders(x, y, from_below, transmitted):
@@ -47,12 +53,8 @@ def test_light_goes_back_as_it_came():
         assert (there > 0.0) == (from_below or transmitted)
 
 
-def test_files_keep_blocks(tmp_path):
-    path = tmp_path / "block.nc"
-    BLOCK.save(path)
-    loaded = OrderTable.load(path)
-    assert loaded.block == INDEX
-    assert loaded.digest() != dataclasses.replace(loaded, block=1.5001).digest()
+def test_the_index_of_a_block_is_in_its_digest():
+    assert BLOCK.digest() != dataclasses.replace(BLOCK, block=1.5001).digest()
 
 
 def test_orders_of_both_faces_are_listed():
@@ -71,5 +73,35 @@ def test_blocks_have_unpolarised_light_alone_and_no_other_medium():
     for change in ({"superstrate": 1.2}, {"thin": True}, {"block": 1.001}, {"block": 7.0}):
         with pytest.raises(DiffractionError, match="block="):
             dataclasses.replace(BLOCK, **change)
+
+
+def test_each_side_has_its_share_of_the_light():
+    rng = np.random.default_rng(1)
+    x, y, lam = rng.uniform(-0.6, 0.6, 50), rng.uniform(-0.6, 0.6, 50), rng.uniform(400, 700, 50)
+    mirror = thin_grating(0.9, counts=COUNTS)
+    for from_below, transmitted in SIDES:
+        share = SHARES[int(from_below), int(from_below != transmitted)]
+        for m in (-1, 0, 1):
+            light = SHEET.efficiency(x, y, lam, m, from_below=from_below, transmitted=transmitted)
+            expected = share * mirror.efficiency(x, y, lam, m)
+            assert light == pytest.approx(expected, abs=1e-6)
+
+
+def test_reversed_light_is_compared_with_the_side_that_it_comes_from():
+    assert SHEET.reciprocity < 1e-6  # single precision
+
+    def one_way(values):
+        changed = values.copy()
+        ports = values.shape[3]
+        changed[:, :, :, : ports // 2, ports // 2 :] *= 0.5
+        return changed
+
+    bands = tuple(Band(band.k, *(one_way(kind) for kind in band.kinds)) for band in SHEET.bands)
+    assert dataclasses.replace(SHEET, response=CellResponse(bands)).reciprocity > 0.1
+
+
+def test_light_below_needs_a_sheet():
     with pytest.raises(DiffractionError, match="thin"):
-        dataclasses.replace(thin_grating(0.5, superstrate=1.5), thin=True)
+        OrderTable.mirror(0.5).efficiency(0.0, 0.0, 500.0, 0, transmitted=True)
+    with pytest.raises(DiffractionError, match="both sides"):
+        dataclasses.replace(OrderTable.mirror(0.5, superstrate=1.5), thin=True)
