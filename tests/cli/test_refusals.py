@@ -71,7 +71,14 @@ REFUSED = {
     # heights with notes, which would be in vain
     f"spectrum noise.npy {_SMALL}": {"--coat-ior 0.5": "coat_ior=0.5 must be"},
     f"brdf-map noise.npy {_SMALL}": {"--coat-ior 0.5": "coat_ior=0.5 must be"},
-    "spectrum": {"empty": "empty", "none*.npy": "none*.npy", "--group a=none*.npy": "no file"},
+    "spectrum": {
+        "empty": "empty",
+        "none*.npy": "none*.npy",
+        "--group a=none*.npy": "no file",
+        "nothere": "'nothere' does not exist",
+        "--group a=grating.npy --group b=nothere": "'nothere' does not exist",
+    },
+    "survey": {"nothere": "'nothere' does not exist"},
     "survey grating.npy -o out": {
         "--pixel-size 0.08 --coat-ior 0.5": "coat_ior=0.5 must be",
         "--material kerratin": "kerratin",

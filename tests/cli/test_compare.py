@@ -13,6 +13,7 @@ from docs.make.figures import realtime
 from mitsuba_diffraction import DiffractionError, DiffractionTable, glsl, gratings
 from mitsuba_diffraction.cli.console import Bar
 from mitsuba_diffraction.scene import load_scene, passes
+from tests.support.coarse import little_light
 
 pytestmark = pytest.mark.thorough
 
@@ -40,6 +41,7 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     pytest.importorskip("moderngl")
     pytest.importorskip("flip_evaluator")
     monkeypatch.chdir(tmp_path)
+    little_light(monkeypatch.setattr)  # of which a plate alone has none
     grating = gratings.sinusoidal(period=1.6, depth=0.05, periods=8)
     DiffractionTable.build(grating, coherence_width=6).save(tmp_path / "grating.exr")
     file = tmp_path / "plate.xml"
