@@ -1,4 +1,4 @@
-"""What a page and the desktop draw, as numbers."""
+"""What a page and the desktop draw, as numbers; light to show, and differences of pictures."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 
 _READ = """async ([shadows, samples]) => {
     viewer.most = samples;  // the first one through the middles of pixels, as the desktop's
@@ -47,3 +48,20 @@ def of_the_desktop(scene: Any, frames: int, bounces: bool = False) -> NDArray[np
     light.release()
     renderer.release()
     return found
+
+
+def ramp() -> NDArray[np.float32]:
+    """Spectral colours and random ones over 31 stops, linear sRGB (93, 128, 3)."""
+    lines = linear_srgb(response(np.linspace(390.0, 720.0, 128))) * 100.0
+    noise = np.random.default_rng(2).normal(0.3, 0.7, (31, 128, 3))
+    stops = 2.0 ** np.arange(-15.0, 16.0)[:, None, None]
+    return np.concatenate([stops * lines, noise, stops * noise]).astype(np.float32)
+
+
+def largest_difference(expected: NDArray[np.floating], drawn: NDArray[np.floating]) -> float:
+    """ΔE2000 between two pictures in sRGB that differ most."""
+    linear = [
+        np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+        for c in (expected.astype(float), drawn.astype(float))
+    ]
+    return float(delta_e(*linear, exposure=1.0, least=0.0).max())

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import shown
-from tests.support.display import largest_difference, ramp
-from tests.support.pictures import picture
+from tests.support.pictures import largest_difference, picture, ramp
 
 #: Shows linear sRGB (93, 128, 3) by the page's view, at an exposure of 1, in single precision.
 SHOW = """(text) => {
