@@ -6,11 +6,14 @@ import re
 from pathlib import Path
 from typing import Any
 
+from scenes.make.__main__ import main as make_mesh
 from tests.support import ROOT
 from tests.support.orders import thin_grating
 
 #: One patch for all scenes, whose table is made once.
 SMALL = {"resx": "12", "resy": "10", "patch": "../precompute/elaphe_like.toml"}
+#: Meshes for which one coarse snake stands.
+SNAKES = ("elaphe", "xenopeltis")
 #: Tables of solved orders that are large, for which finer grooves with fewer orders stand.
 GRATINGS: dict[str, dict[str, Any]] = {
     "blazed": {}, "cd": {"superstrate": 1.58}, "dvd": {"superstrate": 1.58}, "sinusoidal": {},
@@ -20,9 +23,17 @@ GRATINGS: dict[str, dict[str, Any]] = {
 
 def small_clone(folder: Path) -> Path:
     """Scenes, their meshes and textures, and recipes; `folder` again."""
-    (folder / "scenes").mkdir()
-    for part in ("meshes", "textures"):
-        (folder / "scenes" / part).symlink_to(ROOT / "scenes" / part)
+    meshes = folder / "scenes" / "meshes"
+    meshes.mkdir(parents=True)
+    (folder / "scenes" / "textures").symlink_to(ROOT / "scenes" / "textures")
+    for mesh in (ROOT / "scenes" / "meshes").glob("*.ply"):
+        if mesh.stem not in SNAKES:
+            (meshes / mesh.name).symlink_to(mesh)
+    # a fifth of the triangles
+    coarse = ["--detail", "1", "--head-detail", "12"]
+    assert make_mesh(["snake", "-o", str(meshes / f"{SNAKES[0]}.ply"), *coarse]) == 0
+    for name in SNAKES[1:]:
+        (meshes / f"{name}.ply").symlink_to(meshes / f"{SNAKES[0]}.ply")
     for scene in (ROOT / "scenes").glob("*.xml"):
         text = scene.read_text(encoding="utf-8")
         for name, value in SMALL.items():

@@ -34,7 +34,7 @@ SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--positions", "2", "--coherence-width=10"],
-    "solve": ["--period", "0.3", "--resolution", "64", "--tolerance", "0.2", *_NARROW],
+    "solve": ["--period", "0.25", "--resolution", "64", "--tolerance", "0.2", *_NARROW],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
     "export-bsdf": ["--theta", "0,40", "--phi", "0,180", "--resolution", "8"],
     "export-viewer": ["--method", "exact"],

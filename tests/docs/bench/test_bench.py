@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ import pytest
 from docs.make.bench import evaluation, figures, frames, orders, scenes, survey, updates
 from docs.make.bench.__main__ import main
 from docs.make.bench.figures import Goal, Plan, Row, Section
+from tests.support.clone import small_clone
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -22,7 +22,6 @@ TINY = Plan(
     pixels=96, more_pixels=(), other_tables=False, scans=1, lanes=64, slow_lanes=32, rounds=2,
     resolution=12, spp=2, reference_spp=2, map_resolution=8, frame=(12, 8),
 )  # fmt: skip
-SCENES = Path(__file__).parents[3] / "scenes"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -43,9 +42,9 @@ def tiny():
 def measured(tiny, tmp_path_factory):
     """The file of one run of all parts, and its output."""
     file = tmp_path_factory.mktemp("bench") / "bench.json"
-    printed = io.StringIO()
+    scenes, printed = small_clone(tmp_path_factory.mktemp("clone")) / "scenes", io.StringIO()
     with contextlib.redirect_stdout(printed):
-        assert main(["--quick", "--json", str(file), "--scenes", str(SCENES)]) == 0
+        assert main(["--quick", "--json", str(file), "--scenes", str(scenes)]) == 0
     return file, printed.getvalue()
 
 
