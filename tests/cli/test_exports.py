@@ -1,8 +1,9 @@
-"""`export-shader`, `export-osl`, `export-viewer` and `view` from the outside."""
+"""Commands that write folders and pages: `export-*`, `view` and `hologram`."""
 
 from __future__ import annotations
 
 import json
+import os
 import webbrowser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -12,7 +13,9 @@ import OpenEXR
 import pytest
 
 from mitsuba_diffraction import OrderTable
+from mitsuba_diffraction.scene.parameters import check_parameters, files_of
 from tests.support.coarse import little_light
+from tests.support.logos import drawn, write_board
 from tests.support.plate import plate_file
 
 pytestmark = pytest.mark.usefixtures("some_variant")
@@ -145,3 +148,27 @@ def test_without_a_browser_the_address_is_said(run, plate, opened, monkeypatch):
     (page,) = plate.parent.glob("mitsuba-diffraction-*/plate.html")
     assert page.as_uri() in ran.out
     assert opened == []
+
+
+@pytest.fixture
+def logo(here):
+    drawn(64, 4).save("logo.png")
+    return "logo.png"
+
+
+def test_a_card_is_a_folder_that_needs_no_other_file(run, logo):
+    assert run("hologram", logo, "--dots", "64", "--json", "a.json").code == 0
+    scene = Path("logo_hologram/label.xml")
+    assert json.loads(Path("a.json").read_text())["scene"] == str(scene)
+    folder = scene.parent.resolve()
+    assert {file.resolve().parent for file in files_of(scene)} == {folder}
+    assert {file.name for file in files_of(scene)} == set(os.listdir(folder))
+    check_parameters(scene, {"camera_azimuth": "0", "ring_radius": "1", "light": "ring.xml"})
+
+
+def test_a_label_lies_on_the_front_of_a_mesh(run, logo):
+    write_board(Path("board.obj"))
+    ran = run("hologram", logo, "--mesh", "board.obj", "--up", "z", "-o", "a/b")
+    assert ran.code == 0, ran.err
+    assert 'type="fitted_mesh"' in Path("a/b/label.xml").read_text()
+    assert Path("a/b/board.obj").read_bytes() == Path("board.obj").read_bytes()

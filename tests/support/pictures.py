@@ -30,18 +30,28 @@ def picture(tab: Any, *, shadows: bool = False, samples: int = 1) -> NDArray[np.
     return np.frombuffer(base64.b64decode(text), np.float32).reshape(height, width, 4)[::-1]
 
 
-def of_the_desktop(scene: Any, frames: int, bounces: bool = False) -> NDArray[np.float32]:
-    """What `Renderer` draws of all direct light, and on request of light between surfaces.
-
-    Skips the test where shaders do not run.
-    """
+def desktop_renderer(scene: Any) -> Any:
+    """The desktop's renderer of a scene; skips the test where shaders do not run."""
     pytest.importorskip("moderngl")
     from mitsuba_diffraction.realtime.glsl import Renderer
 
     try:
-        renderer = Renderer(scene)
+        return Renderer(scene)
     except DiffractionError as error:
         pytest.skip(str(error))
+
+
+def by_methods(scene: Any, *methods: str) -> dict[str, NDArray[np.float32]]:
+    """The desktop's pictures of one sample, by method."""
+    renderer = desktop_renderer(scene)
+    found = {method: renderer.render(method, supersampling=1) for method in methods}
+    renderer.release()
+    return found
+
+
+def of_the_desktop(scene: Any, frames: int, bounces: bool = False) -> NDArray[np.float32]:
+    """What `Renderer` draws of all direct light, and on request of light between surfaces."""
+    renderer = desktop_renderer(scene)
     light = renderer.progressive("fast", bounces=bounces)
     light.advance(frames)
     found: NDArray[np.float32] = light.image

@@ -9,7 +9,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable, reference
 from mitsuba_diffraction.optics.display import VIEWS, shown
@@ -27,7 +26,7 @@ from mitsuba_diffraction.realtime.glsl.shader_materials import (
 from mitsuba_diffraction.realtime.glsl.source import display_definitions, plain_source
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour import cached_colours
-from tests.realtime.glsl.shaders import PERFECT, difference, probed
+from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed
 from tests.support.descriptions import CHANGES, ELSEWHERE, base
 from tests.support.kinds import COATED, SLOPE
 from tests.support.lanes import interaction, vectors
@@ -36,12 +35,6 @@ from tests.support.patches import SPECKLE
 from tests.support.pictures import largest_difference, ramp
 
 STRETCH, WAVELENGTH = 0.7, 550.0
-
-
-def paired(wi: NDArray[Any], wo: NDArray[Any]) -> Packed:
-    """Pairs of directions (n, 3)."""
-    directions = np.pad(np.stack([wi, wo]), [(0, 0)] * 2 + [(0, 1)]).astype("f4")
-    return Packed((Texture("directions", directions),), {}, {"PAIRED": ""})
 
 
 def test_a_stretched_patch_under_a_coat_has_the_reference_s_light(gl: Any) -> None:
@@ -133,18 +126,10 @@ def test_shader_and_numpy_show_the_same(gl, view):
     light = ramp()
     rows, columns, _ = light.shape
     source = plain_source("shown.frag", ("library.glsl", "formulas"), display_definitions(view))
-    program = gl.program(
-        vertex_shader=plain_source("whole.vert"),
-        fragment_shader=source.partition("// Picture of a page")[0] + SHOW,
-    )
-    texture = gl.texture((columns, rows), 3, light.tobytes(), dtype="f4")
-    target = gl.texture((columns, rows), 4, dtype="f4")
-    frame = gl.framebuffer([target])
-    frame.use()
-    texture.use(0)
-    gl.vertex_array(program, []).render(vertices=3)
-    drawn = np.frombuffer(frame.read(components=3, dtype="f4"), np.float32).reshape(light.shape)
+    source = source.partition("// Picture of a page")[0] + SHOW
+    parts = Packed((Texture("light", np.pad(light, [(0, 0)] * 2 + [(0, 1)])),))
+    found = drawn(gl, source, parts, (columns, rows)).reshape(light.shape)
     expected = shown(light, view)
     # single precision with a driver's powers; 1/255 is a step of a screen
-    assert np.abs(drawn - expected).max() < 1e-3
-    assert largest_difference(expected, drawn) < 0.5
+    assert np.abs(found - expected).max() < 1e-3
+    assert largest_difference(expected, found) < 0.5
