@@ -16,7 +16,7 @@ from mitsuba_diffraction import OrderTable
 from mitsuba_diffraction.scene.parameters import check_parameters, files_of
 from tests.support.coarse import little_light
 from tests.support.logos import drawn, write_board
-from tests.support.plate import plate_file
+from tests.support.room import plate_file
 
 pytestmark = pytest.mark.usefixtures("some_variant")
 

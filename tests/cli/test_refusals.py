@@ -15,7 +15,7 @@ from PIL import Image
 
 from tests.support import room
 from tests.support.logos import write_board
-from tests.support.plate import plate_file
+from tests.support.room import plate_file
 
 _PIXEL = "--pixel-size 0.08"
 _SMALL = f"{_PIXEL} --coherence-width 6"

@@ -20,10 +20,9 @@ from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.plugin.presets import PATCHES, find_preset
 from scenes.make.__main__ import main as make_mesh
 from tests.support import ROOT, crossed
-from tests.support.boxes import write_boxes
 from tests.support.coarse import little_light
 from tests.support.instruments import nanoscope
-from tests.support.logos import drawn, write_board
+from tests.support.logos import drawn, write_board, write_boxes
 from tests.support.orders import thin_grating
 from tests.support.pages import blocks, spans, typed
 
