@@ -167,6 +167,14 @@ def fine(coarse: None) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
+def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Parameters of a scene whose patch is `gentle_patch`."""
+    from tests.support.scenes import gentle_patch
+
+    return gentle_patch(tmp_path_factory.mktemp("patch"))
+
+
+@pytest.fixture(scope="session")
 def shared_afm() -> Path:
     """Folder of measured patches kept outside the project; tests that need it skip without it."""
     folder = ROOT.parent / "shared" / "afm"

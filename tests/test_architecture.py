@@ -1,7 +1,13 @@
-"""ARCHITECTURE.md: every file and every name in it exists."""
+"""What the package says of itself: ARCHITECTURE.md, tables of contents, docstrings.
+
+Every file and name there exists, and docstrings say what they describe: none of public code begins
+with a pronoun or a preposition. `python -m tests.support.docstrings` prints, for each room, how
+many docstrings begin vaguely in public code and in all code, and how many there are.
+"""
 
 from __future__ import annotations
 
+import ast
 import re
 from collections import Counter
 from functools import cache
@@ -11,6 +17,7 @@ import pytest
 
 import mitsuba_diffraction
 from tests.support import ROOT
+from tests.support.docstrings import Docstring, docstrings
 
 PAGE = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
 PACKAGE = Path(mitsuba_diffraction.__file__).parent
@@ -67,3 +74,75 @@ def test_a_class_name_has_one_meaning():
         for name in re.findall(r"^class ([A-Z]\w*)", file.read_text("utf-8"), re.M)
     )
     assert [name for name, count in found.items() if count > 1] == []
+
+
+INITS = {
+    str(file.parent.relative_to(PACKAGE.parent)): file
+    for file in sorted(PACKAGE.rglob("__init__.py"))
+    if "\nContents\n" in file.read_text("utf-8")
+}
+
+
+def contents(file: Path) -> list[str]:
+    """The names in the first column."""
+    docstring = ast.get_docstring(ast.parse(file.read_text("utf-8")))
+    lines = docstring.split("--------\n")[1].split("\n\n")[0].splitlines()
+    first = [re.match(r"[\w, ]+?(?=  |$| `)", line)[0] for line in lines if line[0] != " "]
+    return [name for names in first for name in names.split(", ")]
+
+
+@pytest.mark.parametrize("name", INITS)
+def test_every_name_is_a_module_or_exported(name):
+    file = INITS[name]
+    tree = ast.parse(file.read_text("utf-8"))
+    exported = {
+        value.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+        for value in node.value.elts
+    }
+    folder = file.parent
+    modules = {path.stem for path in folder.glob("*.py")} | {
+        path.parent.name for path in folder.glob("*/__init__.py")
+    }
+    imported = {
+        alias.name for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) for alias in n.names
+    }
+    assert exported <= modules | imported | {getattr(n, "name", None) for n in tree.body}
+    named = contents(file)
+    assert len(named) == len(set(named)) > 0
+    assert set(named) <= modules | exported
+    # a list of modules is complete; one of names is of those that others use
+    if len(set(named) & modules) > len(named) / 2 and name != "mitsuba_diffraction":
+        listed = set(named) | {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+        assert modules - {"__init__", "__main__"} <= listed
+
+
+def test_most_folders_have_one():
+    folders = {file.parent for file in PACKAGE.rglob("__init__.py")}
+    assert len(INITS) >= len(folders) - 1  # gratings says it in sentences
+
+
+# Part of all docstrings, private code included, that may begin vaguely.
+ALLOWED = 0.02
+
+
+@pytest.fixture(scope="module")
+def texts() -> list[Docstring]:
+    """All docstrings of the package."""
+    return list(docstrings())
+
+
+def listed(texts: list[Docstring]) -> str:
+    """Return one line for each docstring."""
+    return "\n".join(map(str, texts))
+
+
+def test_no_docstring_of_public_code_begins_vaguely(texts):
+    vague = [text for text in texts if text.public and text.vague]
+    assert not vague, f"{len(vague)} of public code:\n{listed(vague)}"
+
+
+def test_few_docstrings_of_all_code_begin_vaguely(texts):
+    vague = [text for text in texts if text.vague]
+    assert len(vague) <= ALLOWED * len(texts), f"{len(vague)} of {len(texts)}:\n{listed(vague)}"

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import mitsuba_diffraction
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.files import MESHES
@@ -218,3 +219,26 @@ def test_tangents_of_shapes_are_those_of_the_table_in_own_scene(shape):
         towards = -np.sign(outside) * (np.abs(outside) > 1)  # along the axis that is far away
         along = np.array(scene.ray_intersect(mi.Ray3f(outside, list(towards))).dp_du)
         np.testing.assert_allclose(along / np.linalg.norm(along), expected, atol=1e-5)
+
+
+TROUBLES = PAGES["docs/troubleshooting.md"]
+# Mitsuba's own message
+FOREIGN = {'Plugin "diffraction" not found'}
+
+
+@pytest.fixture(scope="module")
+def source() -> str:
+    """Code of the package, with literals that continue on the next line joined."""
+    files = sorted(Path(mitsuba_diffraction.__file__).parent.rglob("*.py"))
+    code = "".join(path.read_text(encoding="utf-8") for path in files)
+    return re.sub(r"[\"']\n\s*f?[\"']", "", code)
+
+
+def test_every_quoted_message_exists(source):
+    section = TROUBLES.split("## Messages")[1].split("\n## ")[0]
+    rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| ")][1:]
+    quoted = [part for row in rows for part in re.findall(r"`([^`]+)`", row)]
+    own = [text for text in quoted if text not in FOREIGN]
+    fragments = [piece.strip() for text in own for piece in text.split("…")]
+    assert len(fragments) > 15
+    assert [piece for piece in fragments if piece and piece not in source] == []

@@ -1,4 +1,11 @@
-"""The examples in Python that the pages show run."""
+"""What README, docs and notebooks show runs: examples in Python, and commands in their order.
+
+Commands run on small patches and pictures. What is not run here: the gallery's, whose scenes
+test_scenes_thorough.py renders; `make`, `pip` and `apt`, which set up what runs these tests;
+`view`, which opens a window; `tradeoff`, `compare`, `plan` and `solve --crossed`, which take long
+at their smallest, and are run smaller still by their own tests. `render --denoise` runs without it.
+test_docs.py checks what these would be given.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +19,15 @@ from PIL import Image
 
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.orders.solve import jobs
-from tests.support.clone import small_clone
+from tests.support.commands import commands, run_page, small_clone, small_tree
 from tests.support.pages import PAGES, blocks
 
-pytestmark = pytest.mark.thorough
+pytestmark = [
+    pytest.mark.thorough,
+    # heights as coarse and steep as the stand-ins' are worth a warning
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("some_variant"),
+]
 
 DENOISER = importlib.util.find_spec("pyoidn") is not None
 
@@ -30,10 +42,8 @@ def inputs(tmp_path_factory) -> Path:
     return folder
 
 
-# the example's smooth heights are far from what its pixel size would resolve
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 @pytest.mark.parametrize("page", [p for p in PAGES if p != "README.md" and blocks(p, "python")])
-def test_the_python_blocks_of_a_page_run(page, inputs, monkeypatch, some_variant):
+def test_the_python_blocks_of_a_page_run(page, inputs, monkeypatch):
     monkeypatch.chdir(inputs)
     monkeypatch.setitem(boundary.MODELS, "dulled", None)  # extending.md enters a model
     monkeypatch.delitem(boundary.MODELS, "dulled")
@@ -45,3 +55,13 @@ def test_the_python_blocks_of_a_page_run(page, inputs, monkeypatch, some_variant
         exec(re.sub(r"\.advance\(\d+\)", ".advance(2)", text), {})  # of many frames two
     if len(here) < len(blocks(page, "python")):
         pytest.skip("a denoiser needs the extra denoise; the other blocks ran")
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory):
+    return small_tree(tmp_path_factory.mktemp("clone"))
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p != "docs/gallery.md" and commands(p)])
+def test_the_commands_of_a_page_run(page, tree, monkeypatch):
+    run_page(page, tree, monkeypatch)

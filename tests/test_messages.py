@@ -1,4 +1,8 @@
-"""Messages keep what they say, but for what is long in itself; warnings name the user's line."""
+"""Messages keep what they say, but for what is long in itself; warnings name the user's line.
+
+A package that is not installed is one line that names the extra which has it. Streams are the
+program's: only our own command line keeps a library's words from them.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,8 @@ import os
 import re
 import subprocess
 import sys
+import threading
+import tomllib
 import unicodedata
 from pathlib import Path
 
@@ -14,6 +20,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.errors import (
     DiffractionError,
     DiffractionWarning,
@@ -21,7 +28,10 @@ from mitsuba_diffraction.errors import (
     printable,
     warn,
 )
+from mitsuba_diffraction.extras import optional
+from mitsuba_diffraction.streams import own_program, without_chatter
 from tests.support import ROOT
+from tests.support.directions import rough_patch
 from tests.support.docstrings import PACKAGE
 
 
@@ -105,3 +115,81 @@ def test_commands_that_messages_name_exist():
     named = {name for text in texts for name in re.findall(r"the command '([\w-]+)", text)}
     assert "precompute" in named
     assert named <= set(commands)
+
+
+@pytest.fixture
+def damaged(tmp_path):
+    """A table whose pixels cannot be decompressed, of which OpenEXR says so in two streams."""
+    file = tmp_path / "table.exr"
+    DiffractionTable.build(rough_patch((20, 24), (0.08, 0.09), 0.15), coherence_width=1.8).save(
+        file
+    )
+    file.write_bytes(file.read_bytes()[:-100] + bytes(100))
+    return file
+
+
+def load(file):
+    with pytest.raises(DiffractionError):
+        DiffractionTable.load(file)
+
+
+def test_a_library_s_streams_are_left_alone(damaged, capfd):
+    before = os.fstat(1), os.fstat(2)
+    load(damaged)
+    assert all("EXR_ERR" in line for line in capfd.readouterr().err.splitlines())
+    with without_chatter():
+        assert os.path.samestat(before[1], os.fstat(2))
+        print("heard")
+    assert capfd.readouterr().out == "heard\n"
+
+
+def test_a_program_of_ours_says_its_own_line_only_and_keeps_its_streams(damaged, capfd):
+    before = os.fstat(1), os.fstat(2)
+    with own_program():
+        threads = [threading.Thread(target=load, args=[damaged], daemon=True) for _ in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60)
+    assert capfd.readouterr() == ("", "")
+    assert all(os.path.samestat(a, os.fstat(n)) for n, a in enumerate(before, start=1))
+    print("after")
+    os.write(2, b"as well")
+    assert capfd.readouterr() == ("after\n", "as well")
+
+
+with (ROOT / "pyproject.toml").open("rb") as file:
+    EXTRAS = tomllib.load(file)["project"]["optional-dependencies"]
+
+
+@pytest.mark.parametrize(
+    ("module", "package"),
+    [
+        ("SurfaceTopography.IO", "SurfaceTopography"),
+        ("distributed", "distributed"),
+        ("flip_evaluator", "flip-evaluator"),
+        ("imageio_ffmpeg", "imageio-ffmpeg"),
+        ("moderngl", "moderngl"),
+        ("pxr.Usd", "usd-core"),
+        ("pyoidn", "pyoidn"),
+        ("trimesh", "trimesh"),
+    ],
+)
+def test_missing_package_names_an_extra_that_has_it(
+    module: str, package: str, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(DiffractionError) as caught:
+        optional(module, "'a.spm'")
+    text = str(caught.value)
+    assert text.startswith("'a.spm': ")
+    found = re.search(r"pip install (.+) \(extra (\w+)\)", text)
+    assert found, text
+    named, extra = found.groups()
+    assert any(re.match(rf"{package}\b", requirement) for requirement in EXTRAS[extra])
+    assert f"'{package.lower()}" in named.lower()
+
+
+def test_installed_package_is_the_module():
+    pytest.importorskip("distributed")
+    assert optional("distributed") is sys.modules["distributed"]

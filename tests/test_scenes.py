@@ -9,7 +9,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.files import FileKind, kind_of
 from mitsuba_diffraction.heights import Recipe
 from mitsuba_diffraction.scene.parameters import check_parameters, parameters_of
-from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
+from tests.support.scenes import SCENES, SMALL, rendered
 
 # the look-alikes are as steep as the real scales, which the package says every time
 pytestmark = [
@@ -29,11 +29,6 @@ STUDIO = (
     "scales_macro",
     "film",
 )
-
-
-@pytest.fixture(scope="module")
-def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    return gentle_patch(tmp_path_factory.mktemp("patch"))
 
 
 @pytest.mark.usefixtures("variant")

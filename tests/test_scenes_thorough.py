@@ -5,18 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
+from tests.support.scenes import SCENES, SMALL, rendered
 
 # the look-alikes are as steep as the real scales, which the package says every time
 pytestmark = [
     pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
 ]
-
-
-@pytest.fixture(scope="module")
-def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    return gentle_patch(tmp_path_factory.mktemp("patch"))
 
 
 @pytest.mark.parametrize("name", ["plate", "sphere", "snake", "xenopeltis"])

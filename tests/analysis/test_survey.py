@@ -33,7 +33,7 @@ SMALL = {"coherence_width": 6.0, "tolerance": 0.05}
 @pytest.fixture
 def scans(tmp_path):
     """A grating across x, one turned by 30°, and a file that is none."""
-    n = 160
+    n = 128
     x, y = PIXEL * np.arange(n), PIXEL * np.arange(n)[:, None]
     turn = math.radians(30)
     for name, phase in (("straight", x + 0 * y), ("turned", x * np.cos(turn) + y * np.sin(turn))):
@@ -62,8 +62,10 @@ def _toml(folder, text):
     return path
 
 
-def test_rows_have_periods_to_a_percent_and_directions_to_a_degree(survey, tmp_path):
-    straight, broken, turned = survey()
+def test_rows_have_periods_to_a_percent_and_a_second_run_measures_only_what_is_new(
+    survey, scans, tmp_path, monkeypatch
+):
+    first = straight, broken, turned = survey()
     assert broken["reason"].startswith("'")
     assert "NPY" in broken["reason"]
     for row, direction in ((straight, 0.0), (turned, 30.0)):
@@ -83,6 +85,19 @@ def test_rows_have_periods_to_a_percent_and_directions_to_a_degree(survey, tmp_p
     periods = {float(row["period_1_um"]) for row in table[:2]}
     assert periods == {straight["period_1_um"], turned["period_1_um"]}
     assert (tmp_path / "out" / "sheet.png").is_file()
+
+    measured, measure = [], module.measure
+
+    def counted(job, contents=None):
+        measured.append(job.files.scene)
+        return measure(job, contents)
+
+    monkeypatch.setattr(module, "measure", counted)
+    assert survey() == [*first]
+    assert measured == []
+    np.save(scans[2], np.load(scans[2]) * 0.5)
+    assert survey()[2]["range_um"] == pytest.approx(0.5 * turned["range_um"])
+    assert measured == [str(scans[2])]
 
 
 def test_heights_that_an_option_scales_say_so_and_a_flat_scan_is_last(scans, tmp_path):
@@ -105,23 +120,6 @@ def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path)
     options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
     (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, common=own, resolution=8)
     assert "starts at 500 nm" in row["reason"]
-
-
-def test_a_second_run_does_only_what_is_new(survey, scans, monkeypatch):
-    first = survey()
-    measured = []
-    measure = module.measure
-
-    def counted(job, contents=None):
-        measured.append(job.files.scene)
-        return measure(job, contents)
-
-    monkeypatch.setattr(module, "measure", counted)
-    assert survey() == first
-    assert measured == []
-    np.save(scans[2], np.load(scans[2]) * 0.5)
-    assert survey()[2]["range_um"] == pytest.approx(0.5 * first[2]["range_um"])
-    assert measured == [str(scans[2])]
 
 
 def test_the_command_writes_the_folder(run, scans, tmp_path):

@@ -1,4 +1,4 @@
-"""One scan has one reflectance at one direction, by every command and in Python."""
+"""One scan has one reflectance at a direction and one table, by every command and in Python."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.colour import response
+from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.directions import polar
 from tests.support.lanes import brdf_values
 
@@ -71,7 +72,10 @@ def in_python(scan, material, sine, wavelengths, phi=0.0):
 
 
 @pytest.mark.parametrize("material", [{}, {"material": "keratin"}], ids=["default", "keratin"])
-def test_every_command_and_python_give_one_reflectance(run, scan, material):
+def test_every_command_and_python_give_one_reflectance_from_one_table(
+    run, here, scan, material, monkeypatch
+):
+    monkeypatch.setenv(VARIABLE, str(here / "cache"))
     option = [word for name, value in material.items() for word in (f"--{name}", value)]
     (expected,) = in_python(scan, material, SINE, [WAVELENGTH])
     assert expected > 0.05  # an order is there
@@ -96,18 +100,6 @@ def test_every_command_and_python_give_one_reflectance(run, scan, material):
     row = channel[PIXELS // 2, COLUMN]
     # the mean over a pixel of 0.0026 in a lobe of 0.025: 1e-3
     assert math.pi * float(row) == pytest.approx(expected, rel=3e-3)
-
-    ran = run(
-        "evaluate", scan, *HOW, *option, "--theta", LIGHT, "--phi", 0, "--positions", 0,
-        "--wavelength-range", "500:600", "--step", 10, "--angle-step", 1,
-        f"--angles={DETECTOR - 20:.9f}:{DETECTOR + 20:.9f}", "-o", "e.png",
-    )  # fmt: skip
-    assert ran.code == 0, ran.err
-    with np.load("e.npz") as saved:
-        (line,) = np.nonzero(saved["wavelengths"] == WAVELENGTH)[0]
-        column = np.abs(saved["angles"] - DETECTOR).argmin()
-        f = saved["scatter"][line, column] / math.cos(math.radians(DETECTOR))
-    assert math.pi * f == pytest.approx(expected, rel=1e-3)
 
     values = "".join(f",{name}={value}" for name, value in material.items())
     ran = run(
@@ -134,3 +126,17 @@ def test_every_command_and_python_give_one_reflectance(run, scan, material):
     daylight = 5.0 * response(lam)[:, 1] @ f
     # the table's tolerance, and cells of 0.008 in lobes of 0.0125
     assert float(row["brightest"]) == pytest.approx(daylight, rel=1e-2)
+    # that of light that Mitsuba renders; of a period, `evaluate` has another one
+    assert len(list((here / "cache").glob("table-*"))) == 1
+
+    ran = run(
+        "evaluate", scan, *HOW, *option, "--theta", LIGHT, "--phi", 0, "--positions", 0,
+        "--wavelength-range", "500:600", "--step", 10, "--angle-step", 1,
+        f"--angles={DETECTOR - 20:.9f}:{DETECTOR + 20:.9f}", "-o", "e.png",
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    with np.load("e.npz") as saved:
+        (line,) = np.nonzero(saved["wavelengths"] == WAVELENGTH)[0]
+        column = np.abs(saved["angles"] - DETECTOR).argmin()
+        f = saved["scatter"][line, column] / math.cos(math.radians(DETECTOR))
+    assert math.pi * f == pytest.approx(expected, rel=1e-3)

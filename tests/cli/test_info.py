@@ -101,7 +101,7 @@ element vertex 4
 property float x
 property float y
 property float z
-{uv}element face 2
+{properties}element face 2
 property list uchar int vertex_indices
 end_header
 0 0 0{a}
@@ -113,16 +113,31 @@ end_header
 """
 
 
+@pytest.mark.parametrize("own", [True, False], ids=["normals", "none"])
 @pytest.mark.parametrize("has_uv", [True, False])
-def test_a_mesh_is_judged_by_its_tangents(run, tmp_path, has_uv):
+def test_a_mesh_is_judged_by_its_tangents_and_normals(run, tmp_path, has_uv, own):
     file = tmp_path / "quad.ply"
-    uv = "property float u\nproperty float v\n" if has_uv else ""
-    corners = (" 0 0", " 1 0", " 1 1", " 0 1") if has_uv else ("",) * 4
-    file.write_text(MESH.format(uv=uv, **dict(zip("abcd", corners, strict=True))))
+    names = [*(["nx", "ny", "nz"] if own else []), *(["u", "v"] if has_uv else [])]
+    properties = "".join(f"property float {name}\n" for name in names)
+    values = [
+        (" 0 0 1" if own else "") + (uv if has_uv else "")
+        for uv in (" 0 0", " 1 0", " 1 1", " 0 1")
+    ]
+    file.write_text(MESH.format(properties=properties, **dict(zip("abcd", values, strict=True))))
     data = json.loads(run("info", file, "--json").out)
     assert data["kind"] == "mesh"
     assert data["triangles"] == 2
     assert data["usable"] is has_uv
+    assert (data["normals"] == "in the file") is own
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_normals_of_an_obj_are_those_of_the_file(run, tmp_path, own):
+    normals = "vn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n" if own else "f 1/1 2/2 3/3\n"
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    (tmp_path / "mesh.obj").write_text(text + normals, encoding="ascii")
+    data = json.loads(run("info", tmp_path / "mesh.obj", "--json").out)
+    assert (data["normals"] == "in the file") is own
 
 
 def test_the_albedo_is_plotted(run, table, tmp_path):
@@ -178,28 +193,6 @@ def test_a_question_about_units_is_asked_once(run, here):
     ran = run("info", "nm.npy", "--pixel-size", 0.05)
     assert ran.out.count("in nm? Then divide") == 1
     assert "cannot build the table" in ran.out
-
-
-@pytest.mark.parametrize("own", [True, False])
-@pytest.mark.parametrize("kind", ["ply", "obj"])
-def test_normals_are_those_of_the_file(run, tmp_path, kind, own):
-    places = ["0 0 0", "1 0 0", "0 1 0"]
-    normal = [" 0 0 1"] * 3 if own and kind == "ply" else [""] * 3
-    uv = ["0 0", "1 0", "0 1"]
-    if kind == "ply":
-        names = ["x", "y", "z", *(["nx", "ny", "nz"] if own else []), "u", "v"]
-        lines = ["ply", "format ascii 1.0", "element vertex 3"]
-        lines += [f"property float {name}" for name in names]
-        lines += ["element face 1", "property list uchar int vertex_indices", "end_header"]
-        lines += [f"{a}{n} {t}" for a, n, t in zip(places, normal, uv, strict=True)]
-        lines += ["3 0 1 2"]
-    else:
-        lines = [f"v {place}" for place in places] + [f"vt {t}" for t in uv]
-        lines += ["vn 0 0 1", "f 1/1/1 2/2/1 3/3/1"] if own else ["f 1/1 2/2 3/3"]
-    file = tmp_path / f"mesh.{kind}"
-    file.write_text("\n".join(lines) + "\n", encoding="ascii")
-    data = json.loads(run("info", file, "--json").out)
-    assert (data["normals"] == "in the file") is own
 
 
 def test_formats_are_listed_with_what_to_export_for_others(run):

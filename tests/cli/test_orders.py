@@ -76,6 +76,7 @@ def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     # a process takes a second to start
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
+    monkeypatch.setattr("mitsuba_diffraction.orders.solve.accuracy.SAMPLES", 16)
     grating = ("--period", 0.3, "--depth", 0.01, "--material", 1.5, "--wavelength-range", "540:560")
     settings = ("--tolerance", 0.2, "--resolution", 3, "-o", "block.nc")
     ran = run("solve", "lamellar", *grating, "--block", *settings)

@@ -102,16 +102,6 @@ def test_a_survey_goes_on_in_its_folder_that_the_shell_names_among_the_scans(run
     assert "survey/survey.csv" in ran.err
 
 
-@pytest.mark.parametrize(
-    "command", ["survey nothere", "spectrum nothere", "spectrum --group a=h.npy --group b=nothere"]
-)
-def test_scans_that_do_not_exist_are_refused_and_nothing_is_written(run, world, command):
-    before = _contents(world)
-    assert "'nothere' does not exist" in run(*shlex.split(command)).failed_in_one_line()
-    assert _contents(world) == before
-    assert not Path("survey").exists()
-
-
 @posix
 @pytest.mark.parametrize("link", [os.link, os.symlink], ids=["hard", "symbolic"])
 def test_links_to_an_input_are_that_input(run, world, link):

@@ -59,30 +59,29 @@ def test_a_retired_setting_is_named_and_changes_nothing(run, recipe, here):
     assert len(set(tables)) == 1
 
 
-def test_the_report_says_size_terms_taps_error_and_cost(run, heights, here):
+def test_the_report_says_size_terms_taps_error_and_cost_of_a_table_that_lies_here(
+    run, heights, here
+):
     ran = run("precompute", heights, *QUICK)
     assert ran.code == 0
+    assert os.listdir(here) == ["grating.exr"]
     for part in ("75 x 75 pixels", "orders", "terms", "taps", "near order 0", "tolerance 0.001",
                  " s, ", "GB of memory"):  # fmt: skip
         assert part in ran.out
 
 
-def test_the_table_goes_to_the_current_folder(run, heights, here):
-    assert run("precompute", heights, *QUICK).code == 0
-    assert os.listdir(here) == ["grating.exr"]
-
-
-def test_a_recipe_says_where_its_table_goes(run, recipe, here):
-    assert run("precompute", recipe).code == 0
-    assert os.listdir(here) == []
-    table = DiffractionTable.load(recipe.parent / "tables" / "grating.exr")
-    assert table.coherence_width == 6
-
-
-def test_a_recipe_that_does_not_say_puts_its_table_into_the_current_folder(run, recipe, here):
-    recipe.write_text("".join(recipe.read_text().splitlines(True)[:-1]))
-    assert run("precompute", recipe).code == 0
-    assert os.listdir(here) == ["grating.exr"]
+def test_recipes_say_where_their_tables_go_or_these_lie_here(run, recipe, here):
+    other, silent = (recipe.with_name(f"{name}.toml") for name in ("other", "silent"))
+    text = recipe.read_text()
+    other.write_text(text.replace("tables/grating", "tables/other"))
+    silent.write_text("".join(text.splitlines(True)[:-1]))
+    assert run("precompute", recipe, other, silent).code == 0
+    assert os.listdir(here) == ["silent.exr"]
+    assert sorted(os.listdir(recipe.parent / "tables")) == ["grating.exr", "other.exr"]
+    assert DiffractionTable.load("silent.exr").coherence_width == 6
+    # options override recipes
+    assert run("precompute", recipe, "--coherence-width", "5", "-o", "a.exr").code == 0
+    assert DiffractionTable.load("a.exr").coherence_width == 5
 
 
 def test_tilt_is_said_before_the_work_and_once(run, heights, here, monkeypatch):
@@ -107,18 +106,6 @@ def test_what_is_cut_off_is_reported(run, heights, here):
     assert "cropped to the middle 3.04 x 4.8 µm of 6 x 6 µm (38 x 60 of 75 x 75 pixels)" in ran.out
 
 
-def test_options_override_a_recipe(run, recipe, here):
-    assert run("precompute", recipe, "--coherence-width", "5", "-o", "a.exr").code == 0
-    assert DiffractionTable.load("a.exr").coherence_width == 5
-
-
-def test_several_recipes_make_several_tables(run, recipe, here):
-    other = recipe.with_name("other.toml")
-    other.write_text(recipe.read_text().replace("tables/grating", "tables/other"))
-    assert run("precompute", recipe, other).code == 0
-    assert sorted(os.listdir(recipe.parent / "tables")) == ["grating.exr", "other.exr"]
-
-
 def test_a_warning_of_the_heights_is_said_once(run, heights, here):
     ran = run("precompute", heights, "--pixel-size", "0.2", "--coherence-width", "12")
     assert ran.code == 0
@@ -138,20 +125,6 @@ def test_progress_is_shown_where_asked_for(run, heights, here, monkeypatch):
     monkeypatch.setattr(Bar.__init__, "__defaults__", (" steps", 0))
     assert "transforming" in run("precompute", heights, *QUICK, "--progress").err
     assert run("precompute", heights, *QUICK).err == ""
-
-
-def test_the_source_is_never_overwritten(run, heights, here):
-    import OpenEXR
-
-    field = {"Y": np.load(heights).astype(np.float32)}
-    OpenEXR.File({}, field).write("heights.exr")
-    before = (here / "heights.exr").read_bytes()
-    ran = run("precompute", "heights.exr", *QUICK)
-    assert "its output is called 'heights-2.exr'" in ran.err
-    line = run("precompute", "heights.exr", *QUICK, "-o", "heights.exr").failed_in_one_line()
-    assert "would overwrite" in line
-    assert (here / "heights.exr").read_bytes() == before
-    assert (here / "heights-2.exr").exists()
 
 
 def test_several_files_make_one_table_of_their_mean_power(run, heights, here):

@@ -1,11 +1,18 @@
-"""Windows of a wide scan on workers: the same table, to the last bit, whatever happens to them."""
+"""Windows of a wide scan on workers: the same table, to the last bit, whatever happens to them.
+
+Files of tasks on a worker without a cache lie where no other user can put theirs.
+"""
 
 from __future__ import annotations
 
 import json
+import stat
 
 import numpy as np
 import pytest
+
+from mitsuba_diffraction.cluster import tasks
+from tests.support.systems import posix
 
 distributed = pytest.importorskip("distributed")
 
@@ -89,3 +96,17 @@ def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_p
     assert "tasks of windows" in ran.out
     assert DiffractionTable.load("scan.exr").digest() == alone.digest()
     assert json.loads((tmp_path / "out.json").read_text())["workers"]["tasks"] > 10
+
+
+@posix
+def test_without_a_cache_the_folder_is_new_and_private(tmp_path, monkeypatch):
+    (tmp_path / "mitsuba_diffraction").mkdir()  # somebody else's
+    monkeypatch.setattr(tasks.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(tasks, "cache_folder", lambda: None)
+    tasks._own_temporary.cache_clear()
+    files = tasks.SceneFiles("/a/scene.xml", (), (("/a/scene.xml", "0" * 64),))
+    files.keep({"0" * 64: b"<scene/>"})
+    (made,) = (folder for folder in tmp_path.iterdir() if folder.name != "mitsuba_diffraction")
+    assert stat.S_IMODE(made.stat().st_mode) == 0o700
+    assert [*(tmp_path / "mitsuba_diffraction").iterdir()] == []
+    tasks._own_temporary.cache_clear()

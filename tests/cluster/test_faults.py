@@ -1,4 +1,4 @@
-"""Workers, clients and schedulers that are killed or stopped, and disks that are full."""
+"""Workers, clients and schedulers that are killed or stopped; disks, full or with damaged sums."""
 
 from __future__ import annotations
 
@@ -17,14 +17,18 @@ pytestmark = pytest.mark.thorough
 
 pytest.importorskip("distributed")
 
-from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import groups, workers  # noqa: E402
+from mitsuba_diffraction.cluster.jobs import build_on_workers  # noqa: E402
+from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task  # noqa: E402
 from mitsuba_diffraction.scene import Stop  # noqa: E402
 from mitsuba_diffraction.scene.passes import Span  # noqa: E402
+from mitsuba_diffraction.settings import TableSettings  # noqa: E402
 from tests.cluster.clusters import VARIANT, film, passes_of_picture, rendered, silent  # noqa: E402
 from tests.support import ROOT  # noqa: E402
 from tests.support.room import SCENE  # noqa: E402
+from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
 
 
 def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected, three_groups):
@@ -43,6 +47,24 @@ def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected, t
     client.wait_for_workers(3, timeout=300)
     np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
     client.cluster.scale(2)
+
+
+def test_two_workers_of_which_one_is_killed_build_the_same_table(client):
+    scan, killed = HeightField(rough(300), PIXEL, name="scan", cut_out=True), []
+
+    def disturb(done, total, text):
+        if done >= 10 and not killed:
+            killed.append(next(iter(client.cluster.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    table, work = build_on_workers(scan, TableSettings(**SETTINGS), client, disturb)
+    assert killed
+    alone = DiffractionTable.build(scan, **SETTINGS)
+    assert table.digest() == alone.digest()
+    assert table.error == alone.error
+    assert table.source == alone.source
+    assert work.tasks > 10
+    client.wait_for_workers(2, timeout=300)
 
 
 def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path, monkeypatch):
@@ -206,3 +228,51 @@ def test_a_copy_of_a_scene_is_the_scene(scene, expected, monkeypatch, tmp_path):
         run_task(task)
     assert missing.value.digests == sorted(contents)
     assert run_task(task, contents).raw.shape[:2] == expected.shape[:2]
+
+
+FIRST, SECOND = Span(0, 1), Span(1, 1)
+
+
+def cut(content: bytes) -> bytes:
+    return content[:-100]
+
+
+def times_50(content: bytes) -> bytes:
+    return content[:-4096] + (50 * np.frombuffer(content[-4096:], np.float64)).tobytes()
+
+
+def not_a_number(content: bytes) -> bytes:
+    return content[:-4096] + np.full(512, np.nan).tobytes()
+
+
+@pytest.mark.parametrize("damage", [cut, times_50, not_a_number])
+def test_damaged_sums_are_rendered_again(scene, tmp_path, damage):
+    frame, said = passes_of_picture(scene), []
+    kept, sums = Kept(tmp_path / "passes", said.append), run_task(frame.part(FIRST))
+    kept.write(frame, FIRST, sums)
+    assert kept.spans(frame) == {FIRST}
+    assert np.array_equal(kept.read(frame, FIRST).raw, sums.raw)
+    (file,) = (tmp_path / "passes").iterdir()
+    file.write_bytes(damage(file.read_bytes()))
+    assert kept.read(frame, FIRST) is None
+    assert kept.spans(frame) == set()
+    (line,) = said
+    assert str(file) in line
+
+
+def test_sums_under_the_name_of_others_are_rendered_again(scene, tmp_path):
+    frame = passes_of_picture(scene)
+    kept = Kept(tmp_path / "passes", lambda _: None)
+    kept.write(frame, FIRST, run_task(frame.part(FIRST)))
+    (file,) = (tmp_path / "passes").iterdir()
+    file.rename(file.with_name(file.name.replace("-0-1", "-1-1")))
+    assert kept.spans(frame) == {SECOND}
+    assert kept.read(frame, SECOND) is None
+
+
+def test_sums_of_a_finished_picture_are_removed(scene, tmp_path):
+    frame = passes_of_picture(scene)
+    kept = Kept(tmp_path / "passes")
+    kept.write(frame, FIRST, run_task(frame.part(FIRST)))
+    kept.forget(frame)
+    assert not (tmp_path / "passes").exists()

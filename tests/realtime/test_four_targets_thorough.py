@@ -21,7 +21,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.plugin.description import describe
-from mitsuba_diffraction.realtime.glsl import Renderer
+from mitsuba_diffraction.realtime.glsl import Renderer, renderer
 from mitsuba_diffraction.realtime.glsl.shader_materials import GLSL
 from mitsuba_diffraction.realtime.web.export import make_page
 from mitsuba_diffraction.scene import read_exr
@@ -90,6 +90,19 @@ def arch() -> tuple[Array, Array, Array, NDArray[np.int64]]:
     b, c, d = a + 1, a + 1 + len(turn), a + len(turn)
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     return np.concatenate(rows), normals, np.concatenate(uv), faces
+
+
+def write_mesh(file: Path, positions: Array, normals: Array, uv: Array, faces: Any) -> str:
+    """Write a mesh with vertices (..., 3) and triangles (n, 3); its file."""
+    mesh = mi.Mesh(file.stem, positions.size // 3, len(faces), has_vertex_normals=True,
+                   has_vertex_texcoords=True)  # fmt: skip
+    parameters = mi.traverse(mesh)
+    for key, values in (("positions", positions), ("normals", normals), ("texcoords", uv)):
+        parameters[f"vertex_{key}"] = values.astype(np.float32).ravel()
+    parameters["faces"] = faces.astype(np.uint32).ravel()
+    parameters.update()
+    mesh.write_ply(str(file))
+    return str(file)
 
 
 def scene_of(bsdfs: dict[str, Any], places: dict[str, Any], mesh: Path) -> dict[str, Any]:
@@ -164,16 +177,8 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
         )
         for n, name in enumerate(bsdfs)
     }
-    positions, normals, uv, faces = arch()
-    mesh = mi.Mesh("arch", len(positions), len(faces), has_vertex_normals=True,
-                   has_vertex_texcoords=True)  # fmt: skip
-    parameters = mi.traverse(mesh)
-    for key, values in (("positions", positions), ("normals", normals), ("texcoords", uv)):
-        parameters[f"vertex_{key}"] = values.astype(np.float32).ravel()
-    parameters["faces"] = faces.astype(np.uint32).ravel()
-    parameters.update()
-    mesh.write_ply(str(folder / "arch.ply"))
-    made = Stage(bsdfs, places, folder / "arch.ply", Halves(np.zeros(0), np.zeros(0)))
+    mesh = Path(write_mesh(folder / "arch.ply", *arch()))
+    made = Stage(bsdfs, places, mesh, Halves(np.zeros(0), np.zeros(0)))
     return made._replace(traced=traced(made.scene(bsdfs), SAMPLES))
 
 
@@ -226,14 +231,14 @@ def check(stage: Stage, found: Halves, names: list[str], least: int, joined: int
 
 def test_glsl_shows_them_as_the_path_tracer_does(gl: Any, stage: Stage) -> None:
     names = list(stage.bsdfs)
-    renderer = Renderer(stage.scene(names), context=gl)
-    light = renderer.progressive("fast")
+    made = Renderer(stage.scene(names), context=gl)
+    light = made.progressive("fast")
     light.advance(FRAMES // 2)
     first = blocks(light.image)
     light.advance(FRAMES // 2)
     found = Halves(first, 2.0 * blocks(light.image) - first)
     light.release()
-    renderer.release()
+    made.release()
     check(stage, found, names, 30)
 
 
@@ -252,6 +257,70 @@ def test_the_page_shows_them_as_the_path_tracer_does(
     )
     assert opened.said == []
     check(stage, Halves(first, 2.0 * whole - first), names, 30)
+
+
+def balls(stage: Stage, folder: Path) -> dict[str, Any]:
+    """One ball of each surface, in rows; triangles of every other one are clockwise."""
+    T = mi.ScalarTransform4f
+    files = [ball(folder, clockwise) for clockwise in (False, True)]
+    shapes = {
+        f"ball {n}": {
+            "type": "ply", "filename": files[n % 2], "bsdf": bsdf,
+            "to_world": T().translate([2.2 * (n % 6) - 5.5, 2.2 * (n // 6) - 6.6, 0.0]),
+        }
+        for n, bsdf in enumerate(stage.bsdfs.values())
+    }  # fmt: skip
+    view = T().look_at([0.0, -20.0, 60.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    film = {"type": "hdrfilm", "width": 96, "height": 96}
+    light = {
+        "type": "rectangle", "emitter": {"type": "area", "radiance": 20.0},
+        "to_world": T().look_at([10.0, 0.0, 20.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+    }  # fmt: skip
+    return {
+        "type": "scene", **shapes, "light": light, "sky": {"type": "constant"},
+        "sensor": {"type": "perspective", "fov": 14.0, "to_world": view, "film": film},
+    }  # fmt: skip
+
+
+def ball(folder: Path, clockwise: bool) -> str:
+    """Write a ball whose triangles are clockwise, or counter-clockwise, from outside."""
+    rows, columns = 16, 32
+    theta, phi = np.meshgrid(
+        np.linspace(0.0, np.pi, rows + 1), np.linspace(0.0, 2.0 * np.pi, columns + 1), indexing="ij"
+    )
+    places = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
+    b, c, d = a + 1, a + columns + 1, a + columns + 2
+    faces = np.concatenate([np.stack([a, c, b], 1)[columns:], np.stack([b, c, d], 1)[:-columns]])
+    faces = faces[:, ::-1] if clockwise else faces
+    return write_mesh(
+        folder / f"ball_{clockwise}.ply", places, places, np.stack([phi, theta], -1), faces
+    )
+
+
+def test_triangles_that_face_away_change_no_picture(
+    gl: Any, stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Closed surfaces of all materials, drawn without the triangles that face away."""
+    scene = mi.load_dict(balls(stage, tmp_path))
+    enable, drawn, pictures = renderer.enable_sides, list[int](), []
+
+    def noted(context: Any, winding: int) -> None:
+        drawn.append(winding)
+        enable(context, winding if len(pictures) == 0 else 0)
+
+    monkeypatch.setattr(renderer, "enable_sides", noted)
+    made = Renderer(scene, context=gl)
+    for _ in range(2):
+        light = made.progressive("fast")
+        light.advance(4)  # of the lamp and of the sky, the same samples in both pictures
+        pictures.append(light.image[..., :3].astype(float))
+        light.release()
+    made.release()
+    assert {-1, 1} <= set(drawn)
+    culled, whole = pictures
+    # a triangle behind wins where depths are equal, at the outlines
+    assert np.abs(culled - whole).mean() < 1e-3 * whole.mean()
 
 
 _CODE = """

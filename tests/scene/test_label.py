@@ -17,18 +17,12 @@ from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.logo import areas, wavelengths_of
 from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from tests.support.logos import drawn, write_board
-from tests.support.scenes import gentle_patch
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
     pytest.mark.usefixtures("coarse"),
 ]
 _ASPECT = 4 / 3
-
-
-@pytest.fixture(scope="module")
-def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    return gentle_patch(tmp_path_factory.mktemp("patch"))
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.stage import STUDIO
 from mitsuba_diffraction.scene.surfaces import own_id
-from tests.support.boxes import RED, write_boxes
+from tests.support.logos import RED, write_boxes
 from tests.support.orders import thin_grating
 
 

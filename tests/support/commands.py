@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import re
 import shutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -17,12 +19,11 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.plugin.presets import PATCHES, find_preset
 from scenes.make.__main__ import main as make_mesh
-from tests.support import crossed
-from tests.support.boxes import write_boxes
-from tests.support.clone import small_clone
+from tests.support import ROOT, crossed
 from tests.support.coarse import little_light
 from tests.support.instruments import nanoscope
-from tests.support.logos import drawn, write_board
+from tests.support.logos import drawn, write_board, write_boxes
+from tests.support.orders import thin_grating
 from tests.support.pages import blocks, spans, typed
 
 NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan", "--crossed"}
@@ -34,7 +35,7 @@ SMALL = {
     "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--positions", "2", "--coherence-width=10"],
-    "solve": ["--period", "0.3", "--resolution", "64", "--tolerance", "0.2", *_NARROW],
+    "solve": ["--period", "0.25", "--resolution", "64", "--tolerance", "0.2", *_NARROW],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
     "export-bsdf": ["--theta", "0,40", "--phi", "0,180", "--resolution", "8"],
     "export-viewer": ["--method", "exact"],
@@ -189,6 +190,8 @@ def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     little_light(monkeypatch.setattr)
     # a process for each `solve` would take longer to start than to solve
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
+    # half of the work of small tables
+    monkeypatch.setattr("mitsuba_diffraction.orders.solve.accuracy.SAMPLES", 16)
     monkeypatch.chdir(tree)
     # as in a process of its own: Mitsuba looks for files where it was imported
     before = mi.file_resolver()
@@ -200,3 +203,54 @@ def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             run(words)
     finally:
         mi.set_file_resolver(before)
+
+
+#: One patch for all scenes, whose table is made once.
+SMALLER_SCENES = {"resx": "12", "resy": "10", "patch": "../precompute/elaphe_like.toml"}
+#: Meshes for which one coarse snake stands.
+SNAKES = ("elaphe", "xenopeltis")
+#: Tables of solved orders that are large, for which finer grooves with fewer orders stand.
+GRATINGS: dict[str, dict[str, Any]] = {
+    "blazed": {}, "cd": {"superstrate": 1.58}, "dvd": {"superstrate": 1.58}, "sinusoidal": {},
+    "spectrometer": {"thin": True},
+}  # fmt: skip
+
+
+def small_clone(folder: Path) -> Path:
+    """Scenes, their meshes and textures, and recipes; `folder` again."""
+    meshes = folder / "scenes" / "meshes"
+    meshes.mkdir(parents=True)
+    (folder / "scenes" / "textures").symlink_to(ROOT / "scenes" / "textures")
+    for mesh in (ROOT / "scenes" / "meshes").glob("*.ply"):
+        if mesh.stem not in SNAKES:
+            (meshes / mesh.name).symlink_to(mesh)
+    # a fifth of the triangles
+    coarse = ["--detail", "1", "--head-detail", "12"]
+    assert make_mesh(["snake", "-o", str(meshes / f"{SNAKES[0]}.ply"), *coarse]) == 0
+    for name in SNAKES[1:]:
+        (meshes / f"{name}.ply").symlink_to(meshes / f"{SNAKES[0]}.ply")
+    for scene in (ROOT / "scenes").glob("*.xml"):
+        text = scene.read_text(encoding="utf-8")
+        for name, value in SMALLER_SCENES.items():
+            text = re.sub(f'(<default name="{name}" value=)"[^"]*"', rf'\1"{value}"', text)
+        (folder / "scenes" / scene.name).write_text(text, encoding="utf-8")
+    (folder / "precompute" / "looks").mkdir(parents=True)
+    (folder / "precompute" / "orders").mkdir()
+    for table in ROOT.glob("precompute/orders/*.nc"):
+        if table.stem in GRATINGS:
+            thin_grating(0.5, **GRATINGS[table.stem]).save(folder / table.relative_to(ROOT))
+        else:
+            (folder / table.relative_to(ROOT)).symlink_to(table)
+    for recipe in [*ROOT.glob("precompute/*.toml"), *ROOT.glob("precompute/looks/*.toml")]:
+        text = recipe.read_text(encoding="utf-8")
+        if recipe.stem.endswith("_like"):  # a coarser and smaller patch of its kind
+            text = re.sub(r"extent = .*", "extent = 4.0", text)
+            text = re.sub(r"pixels = .*", "pixels = 80", text)
+            text = f"coherence_width = 4.0\n{text}"
+        elif recipe.parent.name == "looks":  # coarser
+            text = re.sub(r"pixels = .*\n", "", text)
+            text = f"coherence_width = 16.0\n{text}pixels = 160\n"
+        elif recipe.stem == "blazed":
+            text = f"{text}periods = 4\nrows = 16\n"
+        (folder / recipe.relative_to(ROOT)).write_text(text, encoding="utf-8")
+    return folder

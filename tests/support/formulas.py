@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.optics.arithmetic import of
-from mitsuba_diffraction.optics.blend import RoughnessTable
-from mitsuba_diffraction.optics.boundary import Geometry, Heights, Jones, Model, kirchhoff
 from mitsuba_diffraction.reference import boundary, coat, model
 from tests.support.directions import uniform_directions
 
@@ -51,30 +48,6 @@ def exact_power(given: Pairs, index: complex, *, coated: bool = False) -> Array:
     if coated:
         jones = coat.transmitted(jones, wi, wo, n, relative)
     return boundary.unpolarised(jones) * (2.0 * inner[0][:, 2] * inner[1][:, 2]) ** 2
-
-
-def faded_jones(geometry: Geometry, index: Any, heights: Heights | None) -> Jones:
-    """Return Kirchhoff's matrix times exp(−κ²σ²/2), which depends on the heights."""
-    assert heights is not None
-    phase = heights.kappa * heights.kappa * heights.variance
-    kept = of(phase).exp(-0.5 * phase)
-    ss, sp, ps, pp = kirchhoff(geometry, index)
-    return ss * kept, sp * kept, ps * kept, pp * kept
-
-
-def halved(table: RoughnessTable) -> RoughnessTable:
-    """Return half the variance of a table."""
-    return RoughnessTable(table.first, 0.5 * table.nodes)
-
-
-FADED = Model("faded", faded_jones, halved)
-
-
-def exact_faded(given: Pairs, index: complex) -> Array:
-    """Return N' of `FADED` by `md.reference` in double precision, (n,)."""
-    jones = model.kirchhoff(given.wi, given.wo, np.full(len(given.wi), index))
-    power = boundary.unpolarised(jones) * (2.0 * given.wi[:, 2] * given.wo[:, 2]) ** 2
-    return power * np.exp(-(given.kappa**2) * given.variance)
 
 
 def check(found: Array, exact: Array) -> None:

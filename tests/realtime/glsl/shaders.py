@@ -66,10 +66,15 @@ def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArra
         (Texture("places", picture),), {"light_colour": np.ones((4, 3), np.float32)}
     )
     source = "".join(text for _, text in fragment_parts(method, parts.definitions)[:-1])
+    return drawn(gl, source + _PROBE, parts, (len(places), 1))
+
+
+def drawn(gl: Any, source: str, parts: Packed, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Colours (n, 3) that a fragment shader draws over a picture of this size."""
     vertex = vertex_source(name="whole.vert")
-    program = gl.program(vertex_shader=vertex, fragment_shader=source + _PROBE)
+    program = gl.program(vertex_shader=vertex, fragment_shader=source)
     bindings = Bindings(gl, parts)
-    target = gl.texture((len(places), 1), 4, dtype="f4")
+    target = gl.texture(size, 4, dtype="f4")
     frame = gl.framebuffer([target])
     frame.use()
     bindings.use(program)
@@ -80,35 +85,31 @@ def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArra
     return result
 
 
-def shaded(gl: Any, shader: Any, wi: NDArray[Any], wo: NDArray[Any]) -> NDArray[np.float64]:
-    """f cosθo of pairs under daylight by an exported shader, (n, 3)."""
+def paired(wi: NDArray[Any], wo: NDArray[Any], **uniforms: Any) -> Packed:
+    """Pairs of directions (n, 3) for `probed`."""
+    directions = np.pad(np.stack([wi, wo]), [(0, 0)] * 2 + [(0, 1)]).astype("f4")
+    return Packed((Texture("directions", directions),), uniforms, {"PAIRED": ""})
+
+
+def shaded(
+    gl: Any, shader: Any, wi: NDArray[Any], wo: NDArray[Any], function: str = "diffraction"
+) -> NDArray[np.float64]:
+    """f cosθo of pairs under daylight by a function of an exported shader, (n, 3)."""
     columns = 2048
     rows = -(-len(wi) // columns)
     both = np.zeros((2, rows * columns, 4), np.float32)
     both[0, : len(wi), :3], both[1, : len(wi), :3], both[..., 3] = wi, wo, 1.0
     both[:, len(wi) :, 2] = 1.0
-    main = f"""
+    source = f"""#version 330
+    {shader.code}
     uniform sampler2D directions;
     out vec4 fragment;
     void main() {{
         ivec2 at = ivec2(gl_FragCoord.xy);
         vec3 wi = texelFetch(directions, at, 0).xyz;
         vec3 wo = texelFetch(directions, at + ivec2(0, {rows}), 0).xyz;
-        fragment = vec4(diffraction(wi, wo), 1.0);
+        fragment = vec4({function}(wi, wo), 1.0);
     }}"""
-    vertex = (
-        "#version 330\nvoid main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, "
-        "gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }"
-    )
-    program = gl.program(
-        vertex_shader=vertex, fragment_shader=f"#version 330\n{shader.code}\n{main}"
-    )
     texture = Texture("directions", both.reshape(2 * rows, columns, 4))
-    bound = Bindings(gl, Packed((*shader.textures, texture), shader.uniforms))
-    target = gl.texture((columns, rows), 4, dtype="f4")
-    frame = gl.framebuffer([target])
-    frame.use()
-    bound.use(program)
-    gl.vertex_array(program, []).render(vertices=3)
-    drawn = np.frombuffer(target.read(), np.float32).reshape(-1, 4)[: len(wi), :3]
-    return drawn.astype(float)
+    parts = Packed((*shader.textures, texture), shader.uniforms)
+    return drawn(gl, source, parts, (columns, rows))[: len(wi)]

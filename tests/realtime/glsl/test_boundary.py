@@ -19,10 +19,10 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_powers,
     pack_responses,
 )
-from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
+from mitsuba_diffraction.realtime.glsl.texels import Packed
 from mitsuba_diffraction.reference import boundary, fresnel, model
 from mitsuba_diffraction.tables.colour import cached_colours
-from tests.realtime.glsl.shaders import DAYLIGHT, PERFECT, difference, probed
+from tests.realtime.glsl.shaders import DAYLIGHT, PERFECT, difference, paired, probed
 from tests.support.directions import as_single, uniform_directions
 
 METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
@@ -77,20 +77,13 @@ def share(
     )
 
 
-def shaded(
-    gl: Any,
-    method: str,
-    table: DiffractionTable,
-    parts: Packed,
-    pair: tuple[Any, ...],
+def sloped(
+    gl: Any, method: str, table: DiffractionTable, parts: Packed, pair: tuple[Any, ...]
 ) -> NDArray[np.float64]:
+    """Colours of pairs by small slope."""
     wi, wo, at = pair
-    directions = np.zeros((2, len(wi), 4), np.float32)
-    directions[0, :, :3], directions[1, :, :3] = wi, wo
-    paired = Packed((Texture("directions", directions),), {"height_scale": HEIGHTS}, {"PAIRED": ""})
-    return probed(
-        gl, method, parts | pack_boundary(MODELS["small_slope"], table.roughness) | paired, at
-    )
+    model = pack_boundary(MODELS["small_slope"], table.roughness)
+    return probed(gl, method, parts | model | paired(wi, wo, height_scale=HEIGHTS), at)
 
 
 @pytest.mark.parametrize("kind", MATERIALS)
@@ -100,7 +93,7 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
     pair = apart(pairs(600), table_of_colours.radius_end)
     plain = probed(gl, "fast", colours | PERFECT, pair[2])
     material = MATERIALS[kind] | (UNTINTED if kind == "conductor" else Packed())
-    found = shaded(gl, "fast", table, colours | material, pair)
+    found = sloped(gl, "fast", table, colours | material, pair)
     expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
     if kind == "conductor":  # its colour is that of daylight, Kirchhoff's at each mean is taken out
         own = index(kind, np.array(RGB_WAVELENGTHS))
@@ -123,14 +116,14 @@ def probed_reflectance(
 def test_lut_has_the_tint_of_a_metal(gl: Any, table: DiffractionTable) -> None:
     pair, lam = pairs(50), np.arange(360.0, 830.5)
     colours = pack_colours(cached_colours(table)) | MATERIALS["conductor"]
-    plain = shaded(gl, "fast", table, colours | UNTINTED, pair)
+    plain = sloped(gl, "fast", table, colours | UNTINTED, pair)
     spectrum = fresnel.reflectance(1.0, index("conductor", lam))
     weights = linear_srgb(response(lam))
     tint = metal_tint(lam, spectrum, spectrum @ weights / weights.sum(axis=0))
     assert np.abs(tint - np.eye(3)).max() > 0.02  # it is a metal with a colour
     expected = plain @ tint.T
     # single precision
-    assert shaded(gl, "fast", table, colours, pair) == pytest.approx(
+    assert sloped(gl, "fast", table, colours, pair) == pytest.approx(
         expected, rel=1e-4, abs=1e-5 * np.abs(expected).max()
     )
 
@@ -144,7 +137,7 @@ def test_exact_has_the_factor_of_each_wavelength(
     # exp(−20) of the largest power
     pair = wi, wo, at = apart(pairs(400), 20**0.5 / (table.sigma_0 * k.min()))
     parts = pack_powers(table) | pack_responses(DAYLIGHT) | MATERIALS[kind]
-    found = shaded(gl, "exact", table, parts, pair)
+    found = sloped(gl, "exact", table, parts, pair)
     weights = linear_srgb(response(lam)) * 0.5 / (lam[:, None] * 1e-3) ** 2
     powers = table.window_sum(*(at[:, n, None] * k for n in range(3)))
     exact = (powers * factor(table, kind, wi, wo, lam)) @ weights

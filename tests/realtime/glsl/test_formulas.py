@@ -10,7 +10,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.boundary import MODELS, Model
 from mitsuba_diffraction.realtime.glsl.formulas import formulas
-from tests.support.formulas import FADED, INDICES, check, exact_faded, exact_power, pairs
+from tests.support.formulas import INDICES, check, exact_power, pairs
 from tests.support.languages import shaded
 
 PAIRS = pairs(4000)
@@ -22,13 +22,6 @@ def test_boundary_is_that_of_the_reference(gl: Any, kind: str, coated: bool) -> 
     index = INDICES[kind]
     found = shaded(gl, PAIRS, MODELS["small_slope"], index, coated)
     check(found, exact_power(PAIRS, index, coated=coated))
-
-
-@pytest.mark.parametrize("kind", ["dielectric", "metal"])
-def test_own_model_of_the_heights(gl: Any, monkeypatch: Any, kind: str) -> None:
-    monkeypatch.setitem(MODELS, FADED.name, FADED)
-    found = shaded(gl, PAIRS, FADED, INDICES[kind], coated=False)
-    check(found, exact_faded(PAIRS, INDICES[kind]))
 
 
 def test_model_that_branches_on_values_is_refused(monkeypatch: Any) -> None:

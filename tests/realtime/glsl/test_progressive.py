@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +54,20 @@ def plate_scene(table_file: Path, width: int = 160, **parts: Any) -> Any:
             **parts,
         }
     )
+
+
+@contextmanager
+def drawn(
+    gl: Any, scene: Any, frames: int, size: tuple[int, int] | None = None
+) -> Iterator[tuple[Renderer, NDArray[np.float64]]]:
+    """The renderer of a scene, and its picture after so many frames, (height, width, 3)."""
+    renderer = Renderer(scene, context=gl)
+    light = renderer.progressive(size=size)
+    light.advance(frames)
+    image = light.image[..., :3].astype(float)
+    light.release()
+    yield renderer, image
+    renderer.release()
 
 
 def truth(renderer: Renderer, spp: int) -> NDArray[np.float64]:
@@ -118,13 +134,9 @@ def test_the_penumbra_of_a_disc_is_the_analytic_one(
             "bsdf": diffuse(0.0),
         },
     )
-    renderer = Renderer(scene, context=gl)
-    light = renderer.progressive(size=(192, 4))
-    light.advance(512)  # every other one draws a light
-    row = light.image[2, :, 1]
-    places = places_on_plate(renderer.camera.resized(192, 4))[2]
-    light.release()
-    renderer.release()
+    # every other frame draws a light
+    with drawn(gl, scene, 512, (192, 4)) as (renderer, image):
+        row, places = image[2, :, 1], places_on_plate(renderer.camera.resized(192, 4))[2]
     expected = irradiance_of_disc(places) * 40.0 * 0.5 / np.pi
     assert (expected < 0.02 * expected.max()).sum() > 20
     assert ((expected > 0.1 * expected.max()) & (expected < 0.9 * expected.max())).sum() > 10
@@ -166,12 +178,8 @@ def test_shadows_have_neither_acne_nor_leaks(
         },
         box={"type": "cube", "to_world": box, "bsdf": diffuse()},
     )
-    renderer = Renderer(scene, context=gl)
-    drawn = renderer.progressive(size=(160, 40))
-    drawn.advance(16)
-    found, expected = drawn.image[..., 1], truth(renderer, 64)[..., 1]
-    drawn.release()
-    renderer.release()
+    with drawn(gl, scene, 16, (160, 40)) as (renderer, image):
+        found, expected = image[..., 1], truth(renderer, 64)[..., 1]
     low, high = minimum_filter(expected, 5), maximum_filter(expected, 5)
     inside = high - low < 0.1 * expected.max()  # neither an edge, nor beside one
     lit, dark = inside & (expected > 0.05 * expected.max()), inside & (expected == 0.0)
@@ -192,13 +200,9 @@ def test_light_outside_a_room_stays_outside(gl: Any, some_variant: str, table_fi
         wide = mi.ScalarTransform4f().scale(20.0)
         walls = {"type": "twosided", "bsdf": diffuse()}
         room = {"type": "cube", "to_world": wide, "bsdf": walls}
-        renderer = Renderer(plate_scene(table_file, emitter=emitter, room=room), context=gl)
-        light = renderer.progressive(size=(40, 10))
-        light.advance(4)
-        found = light.image[..., 1].mean()
-        expected = truth(renderer, 64)[..., 1].mean()
-        light.release()
-        renderer.release()
+        scene = plate_scene(table_file, width=40, emitter=emitter, room=room)
+        with drawn(gl, scene, 4) as (renderer, image):
+            found, expected = (part[..., 1].mean() for part in (image, truth(renderer, 256)))
         assert found == pytest.approx(expected, rel=0.05)
         assert (found > 0.0) == (lit > 0.0)
 
@@ -219,12 +223,8 @@ def test_steep_bumps_shade_themselves_as_in_the_path_tracer(
         plate={"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(4.0), "bsdf": bumpy},
         lamp={"type": "directional", "direction": [1.0, 0.4, -high], "irradiance": 3.0},
     )
-    renderer = Renderer(scene, context=gl)
-    light = renderer.progressive(size=(320, 80))
-    light.advance(16)
-    found, expected = light.image[..., 1].mean(), truth(renderer, 64)[..., 1].mean()
-    light.release()
-    renderer.release()
+    with drawn(gl, scene, 16, (320, 80)) as (renderer, image):
+        found, expected = image[..., 1].mean(), truth(renderer, 64)[..., 1].mean()
     assert found == pytest.approx(expected, rel=0.01)
 
 
@@ -247,13 +247,8 @@ def test_pigments_have_another_colour_in_each_light(
             "to_world": T().translate([0, 5, 0]).rotate([1, 0, 0], 90).scale(9.0),
         },
     )  # fmt: skip
-    renderer = Renderer(scene, context=gl)
-    light = renderer.progressive(size=(40, 10))
-    light.advance(256)
-    found = light.image[5, 20, :3]
-    expected = truth(renderer, 64)[15:25, 70:90].mean(axis=(0, 1))
-    light.release()
-    renderer.release()
+    with drawn(gl, scene, 256, (40, 10)) as (renderer, image):
+        found, expected = image[5, 20], truth(renderer, 64)[15:25, 70:90].mean(axis=(0, 1))
     assert found[0] == pytest.approx(expected[0], rel=0.05)  # how often the light is drawn
     assert found / found[0] == pytest.approx(expected / expected[0], rel=0.02, abs=0.002)
 
@@ -301,7 +296,7 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
             "sensor": {
                 "type": "perspective", "fov": 50,
                 "to_world": T().look_at([0, -2.4, 2.4], [0, 0.5, 0.2], [0, 0, 1]),
-                "film": {"type": "hdrfilm", "width": 40, "height": 30},
+                "film": {"type": "hdrfilm", "width": 32, "height": 24},
             },
             "lamp": {
                 "type": "disk", "to_world": lamp,
@@ -311,15 +306,10 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
             **plates,
         }
     )  # fmt: skip
-    renderer = Renderer(scene, context=gl)
-    light = renderer.progressive()
-    light.advance(768)
-    found = light.image[..., :3].astype(float)
-    light.release()
-    once = direct_light(scene, renderer.camera)
-    expected = np.array(mi.render(once, spp=512), float)[..., :3]
-    shapes = shapes_seen(scene, renderer.camera)
-    renderer.release()
+    with drawn(gl, scene, 768) as (renderer, found):
+        once = direct_light(scene, renderer.camera)
+        expected = np.array(mi.render(once, spp=512), float)[..., :3]
+        shapes = shapes_seen(scene, renderer.camera)
     numbers = [number for number in np.unique(shapes) if number > -2]
     assert len(numbers) >= 1 + len(materials)
     for number in numbers:
@@ -344,13 +334,8 @@ def test_a_mirror_on_a_wide_plate_sees_nothing_beneath_it(
             "bsdf": {"type": "conductor", "material": "Au"},
         },
     )
-    renderer = Renderer(scene, context=gl)
-    light = renderer.progressive(size=(160, 40))
-    light.advance(8)
-    found = light.image[..., 1]
-    light.release()
-    expected = truth(renderer, 16)[..., 1]
-    renderer.release()
+    with drawn(gl, scene, 8, (160, 40)) as (renderer, image):
+        found, expected = image[..., 1], truth(renderer, 16)[..., 1]
     dark = expected == 0.0
     assert dark.sum() > 50
     assert found[dark].max() == 0.0
@@ -366,17 +351,12 @@ def test_a_lamp_may_reflect_other_light(
     above = mi.ScalarTransform4f().translate([0.0, 1.0, 0.6]).rotate([1, 0, 0], 60).scale(0.5)
     scene = plate_scene(
         table_file,
-        width=80,
+        width=48,
         lamp={"type": "point", "position": [0.5, -2.0, 4.0], "intensity": 20.0},
         painted={"type": shape, "to_world": above, "bsdf": paint, "emitter": glow},
     )
-    renderer = Renderer(scene, context=gl)
-    light = renderer.progressive(size=(80, 20))
-    light.advance(512)
-    found, expected = light.image[..., :3], truth(renderer, 256)
-    light.release()
-    shapes = shapes_seen(scene, renderer.camera)
-    renderer.release()
+    with drawn(gl, scene, 512) as (renderer, found):
+        expected, shapes = truth(renderer, 512), shapes_seen(scene, renderer.camera)
     numbers = np.unique(shapes[shapes >= 0])
     assert len(numbers) == 2
     for number in numbers:

@@ -16,57 +16,43 @@ from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 
 pytestmark = pytest.mark.thorough
 
-SENSOR = {"type": "perspective"}
 
-
-def test_a_scene_without_diffraction_is_refused(gl: Any, some_variant: str) -> None:
-    scene = mi.load_dict({"type": "scene", "sensor": SENSOR, "ball": {"type": "sphere"}})
-    with pytest.raises(DiffractionError, match="no supported shape of the scene diffracts"):
-        Renderer(scene, context=gl)
-
-
-def test_cameras_without_perspective_are_refused(
-    gl: Any, some_variant: str, table_file: Path
-) -> None:
-    # what the shaders draw
-    skin = {"type": "diffraction", "filename": str(table_file), "model": "kirchhoff"}
-    scene = mi.load_dict(
-        {
-            "type": "scene",
-            "sensor": {"type": "orthographic"},
-            "plate": {"type": "rectangle", "bsdf": skin},
-        }
-    )
-    with pytest.raises(DiffractionError, match=r"OrthographicCamera.*perspective"):
-        Renderer(scene, context=gl)
-
-
-def test_an_old_driver_is_refused_with_what_it_is() -> None:
-    old = types.SimpleNamespace(version_code=310, info={"GL_RENDERER": "Ancient"})
-    with pytest.raises(DiffractionError, match=r"Ancient has OpenGL 3\.1, .*need 3\.3"):
-        check_version(old)
-
-
-def test_a_driver_with_small_textures_is_refused() -> None:
-    info = {"GL_RENDERER": "Tiny", "GL_MAX_TEXTURE_SIZE": 1024}
-    with pytest.raises(DiffractionError, match=r"Tiny supports textures of 1024 .* need 4096"):
-        check_version(types.SimpleNamespace(version_code=330, info=info))
-
-
-def test_a_mesh_without_texture_coordinates_is_refused(
-    gl: Any, some_variant: str, table_file: Path, tmp_path: Path
-) -> None:
+@pytest.fixture
+def flake(tmp_path: Path, some_variant: str) -> str:
+    """A mesh of one triangle, without texture coordinates."""
     mesh = mi.Mesh("flake", 3, 1)
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = np.array([0.0, 0, 0, 1, 0, 0, 0, 1, 0])
     parameters["faces"] = np.arange(3)
     parameters.update()
     mesh.write_ply(str(tmp_path / "flake.ply"))
-    flake = {"type": "ply", "filename": str(tmp_path / "flake.ply")}
-    skin = {"type": "diffraction", "filename": str(table_file)}
-    scene = {"type": "scene", "sensor": SENSOR, "flake": {**flake, "bsdf": skin}}
-    with pytest.raises(DiffractionError, match="flake: the mesh has no texture coordinates"):
-        Renderer(mi.load_dict(scene), context=gl)
+    return str(tmp_path / "flake.ply")
+
+
+def test_scenes_that_it_does_not_draw_are_refused(gl: Any, table_file: Path, flake: str) -> None:
+    skin = {"bsdf": {"type": "diffraction", "filename": str(table_file)}}
+    for sensor, shape, words in (
+        ("perspective", {"type": "sphere"}, "no supported shape of the scene diffracts"),
+        ("orthographic", {"type": "rectangle", **skin}, r"OrthographicCamera.*perspective"),
+        ("perspective", {"type": "ply", "filename": flake, **skin},
+         "flake: the mesh has no texture coordinates"),
+    ):  # fmt: skip
+        scene = mi.load_dict({"type": "scene", "sensor": {"type": sensor}, "flake": shape})
+        with pytest.raises(DiffractionError, match=words):
+            Renderer(scene, context=gl)
+
+
+@pytest.mark.parametrize(
+    ("version", "most", "words"),
+    [
+        (310, 16384, r"Ancient has OpenGL 3\.1, .*need 3\.3"),
+        (330, 1024, r"Ancient supports textures of 1024 .* need 4096"),
+    ],
+)
+def test_an_old_driver_is_refused_with_what_it_is(version: int, most: int, words: str) -> None:
+    info = {"GL_RENDERER": "Ancient", "GL_MAX_TEXTURE_SIZE": most}
+    with pytest.raises(DiffractionError, match=words):
+        check_version(types.SimpleNamespace(version_code=version, info=info))
 
 
 def test_a_missing_driver_is_one_line_that_says_what_to_install(

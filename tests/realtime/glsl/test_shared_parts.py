@@ -1,4 +1,4 @@
-"""Parts that all shaders share: a pair of directions, the coat, speckle, and gloss."""
+"""Parts that all shaders share: a pair of directions, the coat, speckle, gloss, and the display."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable, reference
+from mitsuba_diffraction.optics.display import VIEWS, shown
 from mitsuba_diffraction.plugin.description import Surface
 from mitsuba_diffraction.realtime.glsl.maps import axis_map
 from mitsuba_diffraction.realtime.glsl.modelled import Modelled
@@ -22,22 +23,18 @@ from mitsuba_diffraction.realtime.glsl.shader_materials import (
     pack_surface,
     packed_by,
 )
+from mitsuba_diffraction.realtime.glsl.source import display_definitions, plain_source
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour import cached_colours
-from tests.realtime.glsl.shaders import PERFECT, difference, probed
+from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed
 from tests.support.descriptions import CHANGES, ELSEWHERE, base
 from tests.support.kinds import COATED, SLOPE
 from tests.support.lanes import interaction, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
 from tests.support.patches import SPECKLE
+from tests.support.pictures import largest_difference, ramp
 
 STRETCH, WAVELENGTH = 0.7, 550.0
-
-
-def paired(wi: NDArray[Any], wo: NDArray[Any]) -> Packed:
-    """Pairs of directions (n, 3)."""
-    directions = np.pad(np.stack([wi, wo]), [(0, 0)] * 2 + [(0, 1)]).astype("f4")
-    return Packed((Texture("directions", directions),), {}, {"PAIRED": ""})
 
 
 def test_a_stretched_patch_under_a_coat_has_the_reference_s_light(gl: Any) -> None:
@@ -115,3 +112,24 @@ def test_every_feature_that_is_shown_changes_what_is_packed(some_variant: str) -
     plain = packed_of(base())
     for feature in GLSL.shows - ELSEWHERE:
         assert packed_of(replace(base(), **CHANGES[feature])) != plain, feature
+
+
+SHOW = """
+uniform sampler2D light;
+out vec4 fragment;
+void main() { fragment = vec4(displayed(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb), 1.0); }
+"""
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_shader_and_numpy_show_the_same(gl, view):
+    light = ramp()
+    rows, columns, _ = light.shape
+    source = plain_source("shown.frag", ("library.glsl", "formulas"), display_definitions(view))
+    source = source.partition("// Picture of a page")[0] + SHOW
+    parts = Packed((Texture("light", np.pad(light, [(0, 0)] * 2 + [(0, 1)])),))
+    found = drawn(gl, source, parts, (columns, rows)).reshape(light.shape)
+    expected = shown(light, view)
+    # single precision with a driver's powers; 1/255 is a step of a screen
+    assert np.abs(found - expected).max() < 1e-3
+    assert largest_difference(expected, found) < 0.5

@@ -14,15 +14,13 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders import OrderTable
-from mitsuba_diffraction.realtime.glsl.context import Bindings
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.lobes import pack_lobes
 from mitsuba_diffraction.realtime.glsl.methods import method_tables
 from mitsuba_diffraction.realtime.glsl.packing import pack_responses
 from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.solved import order_power, pack_orders
-from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
-from tests.realtime.glsl.shaders import DAYLIGHT, difference, probed
+from tests.realtime.glsl.shaders import DAYLIGHT, difference, paired, probed, shaded
 from tests.support.orders import load, thin_grating
 
 WIDTH = 65.0  # µm
@@ -63,18 +61,12 @@ def colours(table: OrderTable) -> Array:
     return wo[:, 2:] * (values.reshape(len(wi), -1) @ weights)
 
 
-def directions(wi: Array, wo: Array) -> Texture:
-    """Both rows of a texture."""
-    return Texture("directions", np.pad(np.stack([wi, wo]), [(0, 0)] * 2 + [(0, 1)]).astype("f4"))
-
-
 @pytest.mark.parametrize("method", ["fast", "exact"])
 def test_colours_are_the_sum_over_wavelengths(
     gl: Any, table: OrderTable, colours: Array, method: str
 ) -> None:
     wi, wo = pairs(table)
-    parts = pack_orders(method, table, sigma_of(WIDTH)) | pack_responses(DAYLIGHT)
-    parts |= Packed((directions(wi, wo),), {}, {"PAIRED": ""})
+    parts = pack_orders(method, table, sigma_of(WIDTH)) | pack_responses(DAYLIGHT) | paired(wi, wo)
     drawn = probed(gl, method, parts, np.zeros((len(wi), 4)))
     # one or two wavelengths stand for a lobe, within which efficiencies change
     assert difference(drawn, colours) < (0.02 if method == "fast" else 0.01)
@@ -110,39 +102,16 @@ def test_the_exported_shader_has_the_same_colours(
 ) -> None:
     wi, wo = pairs(table)
     shader = make_shader(load(table, coherence_width=WIDTH))
-    main = """
-    uniform sampler2D directions;
-    out vec4 fragment;
-    void main() {
-        ivec2 at = ivec2(int(gl_FragCoord.x) / 3, 0);
-        vec3 wi = texelFetch(directions, at, 0).xyz;
-        vec3 wo = texelFetch(directions, at + ivec2(0, 1), 0).xyz;
-        int which = int(gl_FragCoord.x) % 3;
-        fragment.rgb = which == 0 ? diffraction(wi, wo) : which == 1 ? diffraction_exact(wi, wo)
-            : diffraction_transmission(wi, wo);
-    }"""
-    vertex = "#version 330\nvoid main() {{ gl_Position = vec4({}); }}".format(
-        "gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0"
-    )
-    program = gl.program(
-        vertex_shader=vertex, fragment_shader=f"#version 330\n{shader.code}\n{main}"
-    )
-    bound = Bindings(gl, Packed((*shader.textures, directions(wi, wo)), shader.uniforms))
-    target = gl.texture((3 * len(wi), 1), 4, dtype="f4")
-    frame = gl.framebuffer([target])
-    frame.use()
-    bound.use(program)
-    gl.vertex_array(program, []).render(vertices=3)
-    drawn = np.frombuffer(target.read(), np.float32).reshape(-1, 3, 4)[..., :3].astype(float)
-    assert difference(drawn[:, 0], colours) < 0.02
-    assert difference(drawn[:, 1], colours) < 0.01
+    assert difference(shaded(gl, shader, wi, wo), colours) < 0.02
+    assert difference(shaded(gl, shader, wi, wo, "diffraction_exact"), colours) < 0.01
     if table.superstrate == 1.0:
         reflected = [
             sum(table.efficiency(-w[:, :1], -w[:, 1:2], RGB_WAVELENGTHS, m) for m in range(-3, 4))
             for w in (wi, wo)
         ]
         beneath = (1.0 - reflected[0]) * (1.0 - reflected[1])
-        np.testing.assert_allclose(drawn[:, 2], beneath, atol=2e-3)  # half floats, linear cells
+        passed = shaded(gl, shader, wi, wo, "diffraction_transmission")
+        np.testing.assert_allclose(passed, beneath, atol=2e-3)  # half floats, linear cells
 
 
 def test_sheets_are_refused_in_one_line(some_variant: str) -> None:

@@ -22,6 +22,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.glsl.export import export_shader, make_shader
+from mitsuba_diffraction.realtime.web.export import make_page
 from tests.support.browser import PATIENCE
 
 pytestmark = pytest.mark.thorough
@@ -294,23 +295,26 @@ def test_every_surface_is_valid_glsl_of_its_own(
     assert len(code.encode()) < 60_000
 
 
-@pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])
-def test_unknown_methods_are_refused_with_the_choices(scene: Any, methods: list[str]) -> None:
-    bsdf = scene.shapes()[0].bsdf()
-    with pytest.raises(DiffractionError, match="choose from fast, exact"):
+FILMED = md.bsdf_dict(GRATING, coherence_width=6, int_ior=1.5, film_ior=1.8, film_thickness=90)
+
+
+@pytest.mark.parametrize(
+    ("surface", "methods", "words"),
+    [
+        *((None, methods, "choose from fast, exact") for methods in (["flss"], [], ["fast"] * 2)),
+        (FILMED, ["fast"], "an exported shader cannot show"),
+        ({"type": "diffuse"}, ["fast"], "does not diffract"),
+    ],
+    ids=["unknown", "none", "twice", "film", "diffuse"],
+)
+def test_what_shaders_do_not_know_is_refused(
+    scene: Any, surface: dict[str, Any] | None, methods: list[str], words: str
+) -> None:
+    import mitsuba as mi
+
+    bsdf = scene.shapes()[0].bsdf() if surface is None else mi.load_dict(surface)
+    with pytest.raises(DiffractionError, match=words):
         make_shader(bsdf, methods)
-
-
-def test_what_shaders_do_not_know_is_refused(scene: Any) -> None:
-    import mitsuba as mi
-
-    filmed = md.bsdf_dict(GRATING, coherence_width=6, int_ior=1.5, film_ior=1.8, film_thickness=90)
-    with pytest.raises(DiffractionError, match="an exported shader cannot show"):
-        make_shader(mi.load_dict(filmed))
-
-
-def test_only_what_diffracts_has_a_shader(scene: Any) -> None:
-    import mitsuba as mi
-
-    with pytest.raises(DiffractionError, match="does not diffract"):
-        make_shader(mi.load_dict({"type": "diffuse"}))
+    if surface is None:
+        with pytest.raises(DiffractionError, match=words):
+            make_page(scene, methods=methods)

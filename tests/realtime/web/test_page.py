@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import shown
-from tests.support.display import largest_difference, ramp
-from tests.support.pictures import picture
+from tests.support.pictures import by_methods, largest_difference, picture, ramp
 
 #: Shows linear sRGB (93, 128, 3) by the page's view, at an exposure of 1, in single precision.
 SHOW = """(text) => {
@@ -45,19 +43,7 @@ def decoded(text: str) -> NDArray[np.float32]:
 @pytest.fixture(scope="module")
 def desktop(scene: Any) -> dict[str, NDArray[np.float32]]:
     """The desktop's pictures, by method."""
-    from mitsuba_diffraction.realtime.glsl import Renderer
-    from mitsuba_diffraction.realtime.glsl.context import headless_context
-
-    pytest.importorskip("moderngl")
-    try:
-        context = headless_context()
-    except DiffractionError as error:
-        pytest.skip(str(error))
-    renderer = Renderer(scene, context=context)
-    found = {method: renderer.render(method, supersampling=1) for method in ("fast", "exact")}
-    renderer.release()
-    context.release()
-    return found
+    return by_methods(scene, "fast", "exact")
 
 
 def test_both_methods_draw_what_the_desktop_draws(

@@ -163,9 +163,3 @@ def test_what_does_not_fit_is_left_out_from_the_last_on(
     monkeypatch.setattr(packing, "OCTAVES", (0.0,))
     with pytest.raises(DiffractionError, match=r"is too large for a page \(exact: .*; fast: "):
         make_page(scene, bounces=False)
-
-
-@pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])
-def test_unknown_methods_are_refused_with_the_choices(scene: Any, methods: list[str]) -> None:
-    with pytest.raises(DiffractionError, match="choose from fast, exact"):
-        make_page(scene, methods=methods)

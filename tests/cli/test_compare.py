@@ -12,7 +12,8 @@ from PIL import Image
 from docs.make.figures import realtime
 from mitsuba_diffraction import DiffractionError, DiffractionTable, glsl, gratings
 from mitsuba_diffraction.cli.console import Bar
-from mitsuba_diffraction.scene import load_scene, passes
+from mitsuba_diffraction.scene import load_scene, passes, set_variant
+from tests.support.coarse import little_light
 
 pytestmark = pytest.mark.thorough
 
@@ -35,40 +36,65 @@ SCENE = """<scene version="3.5.0">
 """
 
 
-@pytest.fixture
-def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A plate and its table, where OpenGL works."""
     pytest.importorskip("moderngl")
     pytest.importorskip("flip_evaluator")
-    monkeypatch.chdir(tmp_path)
+    folder = tmp_path_factory.mktemp("plate")
     grating = gratings.sinusoidal(period=1.6, depth=0.05, periods=8)
-    DiffractionTable.build(grating, coherence_width=6).save(tmp_path / "grating.exr")
-    file = tmp_path / "plate.xml"
-    file.write_text(SCENE)
-    return file
+    DiffractionTable.build(grating, coherence_width=6).save(folder / "grating.exr")
+    (folder / "plate.xml").write_text(SCENE)
+    set_variant("llvm_ad_rgb")
+    try:
+        glsl.Renderer(load_scene(folder / "plate.xml", {})).release()
+    except DiffractionError as error:
+        if "no OpenGL" not in str(error):
+            raise
+        pytest.skip(str(error))
+    return folder
 
 
-@pytest.mark.parametrize("full", [0, 2])
-def test_progress_covers_all_of_the_work(run, scene, monkeypatch, some_variant, gl_works, full):
-    shares = []
+@pytest.fixture
+def scene(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, some_variant: str) -> Path:
+    """The plate's scene in another folder than the current one."""
+    monkeypatch.chdir(tmp_path)
+    little_light(monkeypatch.setattr)  # of which a plate alone has none
+    return folder / "plate.xml"
+
+
+@pytest.fixture
+def shares(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, str]]:
+    """Shares of the work that the bar shows, and their texts."""
+    found: list[tuple[float, str]] = []
 
     def call(self, done, total, text):
         if total:  # the scene's loading and the preparation of tables have no known length
-            shares.append((done / total, text))
+            found.append((done / total, text))
 
     monkeypatch.setattr(Bar, "__call__", call)
-    ran = run("compare", scene, "--method", "all", "-s", 4, "--full-spp", full, "--frames", 8)
-    assert ran.code == 0, ran
+    return found
+
+
+def check_progress(shares: list[tuple[float, str]], stages: int) -> None:
+    """Shares rise from 0 to the last stage, in which fragments are timed."""
     done = [share for share, _ in shares]
     assert done == sorted(done)
-    stages = 3 + (full > 0) * 3 + 3  # direct light twice, `fast` of 8 and 4 frames, `exact`; times
     assert shares[0][0] == 0.0
     assert shares[-1] == ((stages - 1) / stages, "timing fragments")
 
 
-def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_works):
+def test_progress_covers_all_of_the_work_without_light_between_surfaces(run, scene, shares):
+    ran = run("compare", scene, "--method", "all", "-s", 4, "--full-spp", 0, "--frames", 8)
+    assert ran.code == 0, ran
+    check_progress(shares, 6)  # direct light twice, `fast` of 8 and 4 frames, `exact`; times
+
+
+def test_pictures_a_sheet_and_numbers_are_written(run, scene, shares):
     ran = run("compare", scene, "--method", "all", "-s", 64, "--full-spp", 2, "--supersampling", 2,
               "--frames", 8)  # fmt: skip
     assert ran.code == 0, ran
+    check_progress(shares, 9)
     folder = Path("plate_compare")
     document = json.loads((folder / "compare.json").read_text())
     assert set(document["methods"]) == {"fast", "exact"}
@@ -102,20 +128,10 @@ def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_w
 
 
 def test_a_method_that_does_not_suit_is_refused_before_anything_is_rendered(
-    run, scene, some_variant, gl_works, monkeypatch
+    run, scene, monkeypatch
 ):
     monkeypatch.setattr(passes, "render_pass", lambda *_: pytest.fail("rendered"))
     # the scene's table is of powers; nmm needs heights
     line = run("compare", scene, "--method", "nmm").failed_in_one_line()
     assert "nmm" in line or "heights" in line
     assert not Path("plate_compare").exists()
-
-
-@pytest.fixture
-def gl_works(scene, some_variant):
-    try:
-        glsl.Renderer(load_scene(scene, {}))
-    except DiffractionError as error:
-        if "no OpenGL" not in str(error):
-            raise
-        pytest.skip(str(error))

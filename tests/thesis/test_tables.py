@@ -1,6 +1,9 @@
-"""The thesis' look-up, an image for each term, beside the plugin's."""
+"""The thesis' look-up, an image a term, beside the plugin's; tables kept between processes."""
 
 from __future__ import annotations
+
+import gc
+import weakref
 
 import drjit as dr
 import mitsuba as mi
@@ -9,6 +12,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from docs.make.bench.kernels import kernel_operations
+from mitsuba_diffraction import DiffractionTable, gratings
+from mitsuba_diffraction.thesis.shaders.pack import thesis_method
 from mitsuba_diffraction.thesis.term_images import thesis_bsdf
 from tests.support.directions import polar, rough_patch
 from tests.support.lanes import evaluated, interaction, vectors
@@ -35,3 +40,21 @@ def test_images_of_terms_have_the_plugin_s_values_by_a_loop_over_terms():
         kernel_operations(lambda bsdf=bsdf: bsdf.eval(context, si, out)) for bsdf in (ours, theirs)
     )
     assert loop < terms
+
+
+def test_tables_are_built_once(monkeypatch, tmp_path):
+    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
+    blazed = gratings.blazed(period=2.0, depth=0.2, periods=4)
+    table = DiffractionTable.build(blazed, coherence_width=8.0)
+    first = thesis_method("flss", blazed, table)
+    expected, in_memory = first.table.coefficients.copy(), weakref.ref(first.table)
+    (file,) = tmp_path.glob("*.cache")
+    written = file.stat().st_ino  # another one of a file that is written again
+    del first
+    gc.collect()
+    assert in_memory() is None  # as in the next process
+    second = thesis_method("flss", blazed, table)
+    np.testing.assert_array_equal(second.table.coefficients, expected)
+    assert file.stat().st_ino == written
+    thesis_method("pq", blazed, table)
+    assert len([*tmp_path.glob("*.cache")]) == 2
