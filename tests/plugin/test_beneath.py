@@ -57,6 +57,7 @@ def test_flags_say_what_there_is(some_variant):
 
 
 FLAT = md.HeightField(np.zeros((8, 8)), 0.05, periodic=True)
+WHITE = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
 #: Texels of 0.7 at (0, 0), of 0 and of 1.
 THICKNESSES = {
     "type": "bitmap", "raw": True, "filter_type": "nearest",
@@ -75,10 +76,17 @@ FRINGES = {
 def test_a_film_of_many_fringes_over_white_sends_on_no_more_than_it_gets(some_variant, name):
     # its fringes come and go within 25 nm; a window of a wavelength smears them
     before = use_energy_settings(EnergySettings(polar=24, azimuthal=12))
-    white = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
     film = FRINGES[name] | {"film_ior": 1.32, "int_ior": 1.1, "ext_ior": 1.0}
-    bsdf = load(FLAT, **film, coherence_width=0.5, beneath=white)
+    bsdf = load(FLAT, **film, coherence_width=0.5, beneath=WHITE)
     use_energy_settings(before)
     for seed in range(4):  # of the wavelengths
         mean, error = furnace(bsdf, angles=(70.0, 80.0, 84.0, 87.0), azimuths=(0.0,), seed=seed)
         assert np.all(mean <= 1.003 + 4.0 * error)
+
+
+@pytest.mark.parametrize("width", [1.5, 6.0, 65.0])
+def test_white_beneath_a_less_dense_medium_sends_on_no_more_than_it_gets(mono, width):
+    """Light is totally reflected from 72.2° on, where the albedo rises to 1 within a lobe."""
+    bsdf = load(FLAT, int_ior=1.0, ext_ior=1.05, coherence_width=width, beneath=WHITE)
+    mean, error = furnace(bsdf, angles=(60.0, 68.0, 70.0, 71.7, 73.0, 76.0, 84.0), azimuths=(20.0,))
+    assert np.all(mean <= 1.003 + 4.0 * error), mean

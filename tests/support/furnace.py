@@ -118,6 +118,7 @@ _SHALLOW = md.gratings.sinusoidal(1.6, 0.06, periods=1, pixels_per_period=64, ro
 _FLAT = md.HeightField(np.zeros((8, 8)), 0.5, periodic=True)
 _SHEET = {"plugin": "diffraction_dielectric", "thin": True, "ext_ior": 1.0, "coherence_width": 5.0}
 _METAL = {"material": "Al", "coherence_width": 4.8}
+_WHITE = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
 
 #: Fields and parameters that once made light.
 COMBINATIONS = [
@@ -135,6 +136,9 @@ COMBINATIONS = [
     (_SHALLOW, {"material": "Al", "coat_ior": 1.58, "coherence_width": 12.8}),
     (_SHALLOW, {"material": "none", "coherence_width": 12.8}),
     (noise(0.55), _METAL | {"coat_ior": 1.01}),
+    (_FLAT, {"int_ior": 1.012, "ext_ior": 1.0, "coat_ior": 1.306, "coherence_width": 1.0,
+            "beneath": _WHITE}),
+    (noise(0.3), {"int_ior": 1.8, "ext_ior": 1.0, "model": "kirchhoff", "coherence_width": 4.8}),
 ]  # fmt: skip
 
 
