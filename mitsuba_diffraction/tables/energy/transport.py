@@ -38,8 +38,9 @@ from .settings import energy_settings
 #: The weak orders are smoothed by this share of the distance between rings, at least. Orders that
 #: have wider lobes are all in the density: with 0.6 of the distance their sums were 7 % off.
 SMOOTHING = 1.0
-#: Weak orders of less power in all are left out.
-LEAST_WEAK = 2e-3
+#: Weak orders of less power in all are left out; of less in Kirchhoff's model, whose orders that
+#: graze the horizon, as the light does, gain as 1/(cosθi cosθo): 2.5e-5 was 0.2 of the light at 89.5°.
+LEAST_WEAK, LEAST_GRAZING = 2e-3, 1e-6
 
 #: Width of order 0's lobe, in distances between rings, above which all directions are summed over:
 #: G differs from one azimuth to another, by 0.01 under 4 µm. The quadrature resolves such lobes.
@@ -89,9 +90,6 @@ class ScatteredOrders:
         scale = height_scale * densest
         reach = min(2.0 * longest, table.q_limit)
         self.mixture = order_mixture(table, scale, reach, smoothing)
-        # light that interferes goes with its root
-        least = LEAST_WEAK if self.mixture.beats is None else LEAST_WEAK**2
-        self.has_weak = self.mixture.weak > least
         self.strong = len(self.mixture.frequency)
         self.nodes, self._directions = quadrature(rings, steps), (rings, steps)
         self.distance = 0.5 * math.pi / rings
@@ -104,6 +102,12 @@ class ScatteredOrders:
         self._powers = powers * np.interp(self._kappas, nodes, left)
         #: Least w of light let through
         self.least_width = densest * self.mixture.kappa_step / shortest
+
+    def has_weak(self, model: str) -> bool:
+        """Whether the weak orders of a model matter."""
+        least = LEAST_GRAZING if model == "kirchhoff" else LEAST_WEAK
+        # light that interferes goes with its root
+        return self.mixture.weak > (least if self.mixture.beats is None else least**2)
 
     def upper_nodes(self, critical_sine: float) -> Quadrature:
         """Return directions of y > 0 on both sides of a critical angle."""
@@ -153,7 +157,7 @@ class Transport:
         self._width = 1.0 / (orders.sigma * self._k)  # of a lobe, in direction cosines
         self._width_0 = 1.0 / (orders.sigma_0 * self._k)  # of order 0's
         self._parts: list[Callable[[Single], Single]] = [self._order_0(theta, phi, grid)]
-        if orders.has_weak:
+        if orders.has_weak(path.model):
             self._parts.append(self._weak_towards(theta, phi, grid))
         if orders.strong:
             self._parts.append(self._strong(theta, phi, grid))
