@@ -39,7 +39,7 @@ from .settings import energy_settings
 #: have wider lobes are all in the density: with 0.6 of the distance their sums were 7 % off.
 SMOOTHING = 1.0
 #: Weak orders of less power in all are left out; of less in Kirchhoff's model, whose orders that
-#: graze the horizon, as the light does, gain as 1/(cosθi cosθo): 2.5e-5 was 0.2 of the light at 89.5°.
+#: graze the horizon, as the light does, gain as 1/(cosθi cosθo): 2.5e-5 was 0.2 of it at 89.5°.
 LEAST_WEAK, LEAST_GRAZING = 2e-3, 1e-6
 
 #: Width of order 0's lobe, in distances between rings, above which all directions are summed over:
