@@ -15,6 +15,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..optics import fresnel
@@ -218,6 +219,8 @@ def _excess_of(energy: Energy, found: Conservation) -> list[DirectionalTable]:
     flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
     flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
     values = albedo.values - flat[:, :, None]
+    if material.total(albedo.wavelengths):  # it has a peak just below the critical angle
+        values = scipy.ndimage.maximum_filter1d(values, 3, axis=1)
     return [DirectionalTable(albedo.wavelengths, values.astype(np.float32))]
 
 

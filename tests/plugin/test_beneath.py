@@ -86,7 +86,7 @@ def test_a_film_of_many_fringes_over_white_sends_on_no_more_than_it_gets(some_va
 
 @pytest.mark.parametrize("width", [1.5, 6.0, 65.0])
 def test_white_beneath_a_less_dense_medium_sends_on_no_more_than_it_gets(mono, width):
-    """Light is totally reflected from 72.2° on, where the albedo rises to 1 within a lobe."""
+    """Light is totally reflected from 72.25° on, where the albedo rises to 1 within a lobe."""
     bsdf = load(FLAT, int_ior=1.0, ext_ior=1.05, coherence_width=width, beneath=WHITE)
-    mean, error = furnace(bsdf, angles=(60.0, 68.0, 70.0, 71.7, 73.0, 76.0, 84.0), azimuths=(20.0,))
+    mean, error = furnace(bsdf, angles=(60.0, 70.0, 71.7, 72.1, 72.2, 73.0, 84.0), azimuths=(20.0,))
     assert np.all(mean <= 1.003 + 4.0 * error), mean
