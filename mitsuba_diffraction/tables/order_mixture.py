@@ -21,9 +21,10 @@ PER_PERIOD = 16
 FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
 
 _FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
-#: Bins that reach over at most this (in 1/σ) are joined: together they are hardly wider than one
-#: lobe. Twice as many put orders 1 and −1 of a blazed grating at order 0, and R + T was 1.07.
-_JOINED = 1.0
+#: Bins are joined to neighbours at most so far apart, in 1/σ: each shares its power with two, by
+#: which the centre stays, and lobes are as much narrower as that widens them. With all of a bin at
+#: the nearest, orders 1 and −1 were at order 0, and a window of 0.5 µm had albedos 0.1 off.
+_JOINED = 0.7
 #: Distances between samples of a window's power, in 1/σ: in full, and where its lobes are so wide
 #: that smoothing of the samples would widen them.
 _SAMPLED, _FINE = 0.8, 0.15
@@ -120,7 +121,7 @@ def order_mixture(
         pitch = (0.25 if separate else 0.5) * smoothing
     half = math.ceil(reach / pitch) + 1
     grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
-    splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
+    splats = [_splat(axis.frequency, grid, math.sqrt(smoothing**2 - axis.spread)) for axis in axes]
     density = np.empty((count, 2 * half, 2 * half), np.float32)
     apart = all_smooth and table.grid.overlapping
     beats = np.empty_like(density) if apart else None
@@ -164,7 +165,12 @@ def order_mixture(
 
 
 class _Axis:
-    """Where the powers along one axis are: at the bins, at bins joined, or between them."""
+    """Where the powers along one axis are: at the bins, at bins joined, or between them.
+
+    spread : variance that joining adds, (rad/µm)².
+    """
+
+    spread = 0.0
 
     def __init__(self, table: DiffractionTable, axis: int, *, fine: bool) -> None:
         last, spacing = table.grid.last[axis], table.spacing[axis]
@@ -180,12 +186,13 @@ class _Axis:
             self.weight = step / density / math.sqrt(math.pi)
             return
         joined = max(1, math.floor(_JOINED / step))
-        joined -= (joined + 1) % 2  # odd: order 0 stays in the middle of its own
-        group = np.rint(bins / joined).astype(int)
-        first = group[0]
-        self.frequency = np.arange(first, group[-1] + 1) * joined * spacing
+        end, column = math.ceil(last / joined), np.arange(len(bins))
+        self.frequency = np.arange(-end, end + 1, dtype=np.float64) * (joined * spacing)
+        lower, share = bins // joined, (bins % joined) / joined
         self.matrix = np.zeros((len(self.frequency), len(bins)), np.float32)
-        self.matrix[group - first, np.arange(len(bins))] = 1.0
+        self.matrix[lower + end, column] = 1.0 - share
+        self.matrix[np.minimum(lower + 1 + end, 2 * end), column] += share
+        self.spread = (joined**2 - 1) * spacing**2 / 6.0
         self.weight = 1.0
 
 

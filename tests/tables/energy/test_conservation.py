@@ -113,6 +113,17 @@ def test_an_albedo_under_a_narrow_window_is_the_integral_of_the_model(coherence)
     np.testing.assert_allclose(found, exact, atol=0.02)
 
 
+def test_a_blaze_under_a_window_of_a_wavelength_keeps_its_sides():
+    """Dozens of bins lie within a lobe and are joined: both sides of the mirror differ by 1.3."""
+    heights = 0.2 * np.tile(np.arange(41) / 41.0, (8, 1))
+    patch, light = md.HeightField(heights, 0.073), (600.0, 650.0)
+    table = md.DiffractionTable.build(patch, coherence_width=0.5, wavelength_range=light)
+    exact, found = integrals_and_sums(table, [40.0, 80.0], [0.0, 60.0, 180.0], 636.0)
+    assert exact[1, 2] > 1.2 * exact[1, 0] or exact[1, 0] > 1.2 * exact[1, 2]
+    # samples of the density, half a lobe's deviation apart, are read at the nearest
+    np.testing.assert_allclose(found, exact, rtol=0.03)
+
+
 def test_few_wide_orders_leave_at_the_azimuths_and_grazing_angles_of_the_model():
     """Orders 30° apart with lobes of 3°: each azimuth of incidence sees others."""
     columns = np.random.default_rng(3).random((10, 7))
