@@ -1,6 +1,6 @@
 """What README, docs and notebooks show runs: examples in Python, and commands in their order.
 
-Commands run on small patches and pictures. What is not run here: the gallery's, whose scenes
+Commands run on small patches and pictures. Not run: the gallery's commands, whose scenes
 test_scenes_thorough.py renders; `make`, `pip` and `apt`, which set up what runs these tests;
 `view`, which opens a window; `tradeoff`, `compare`, `plan` and `solve --crossed`, which take long
 at their smallest, and are run smaller still by their own tests. `render --denoise` runs without it.

@@ -38,7 +38,7 @@ from .types import Colour, Vector3f
 #: Indices are rounded to these, real and imaginary part, so that an optimisation of them waits
 #: rarely and sees s and the albedo's excess as constants.
 INDEX_STEP, COAT_STEP, DIELECTRIC_STEP = 0.05, 0.01, 0.002
-#: Of indices about and below that of the medium above, by which light is totally reflected.
+#: Step of indices about and below the medium's above, by which light is totally reflected.
 TOTAL_STEP = 1e-4
 #: Indices that differ from 1 by so many steps at most are rounded to this share of the step.
 NEAR, FINE_SHARE = 4.0, 0.02
@@ -219,7 +219,7 @@ def _excess_of(energy: Energy, found: Conservation) -> list[DirectionalTable]:
     flat = fresnel.reflectance(cosine_within(cosine, coat), index[:, None])
     flat = coated_reflectance(fresnel.reflectance(cosine, coat), flat)
     values = albedo.values - flat[:, :, None]
-    if material.total(albedo.wavelengths):  # it has a peak just below the critical angle
+    if material.total(index):  # the excess has a peak just below the critical angle
         values = scipy.ndimage.maximum_filter1d(values, 3, axis=1)
     return [DirectionalTable(albedo.wavelengths, values.astype(np.float32))]
 

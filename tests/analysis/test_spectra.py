@@ -185,7 +185,7 @@ def _parts(name, lam):
 
 
 WET = _parts("water", SODIUM)["eta"]
-#: Parameters of a BSDF by name, and those of the reference at a wavelength in nm.
+#: Parameters of a BSDF by name, and the reference's parameters at a wavelength in nm.
 MATERIALS = {
     "dielectric": ({"int_ior": 1.5}, lambda lam: {"eta": 1.5}),
     "absorbing": ({"material": "1.56+0.05i"}, lambda lam: {"eta": 1.56, "k": 0.05}),
@@ -206,7 +206,7 @@ MATERIALS = {
 
 
 def spectra_and_reference(name: str, wavelengths: Array) -> tuple[Array, Array]:
-    """Reflectance factors (n, 2) of a rough surface, and those of `md.reference`."""
+    """Reflectance factors (n, 2) of a rough surface by the plugin, and by `md.reference`."""
     patch = rough_patch((24, 24), (0.15, 0.15), 0.08)
     parameters, index = MATERIALS[name]
     medium = parameters.get("ext_ior")

@@ -170,7 +170,7 @@ def test_a_scale_s_bending_does_not_hide_its_fingers():
 
 @pytest.mark.parametrize("seed", range(8))
 def test_waviness_beside_a_grating_has_no_period(seed):
-    """Frequencies that the grating explains are no surroundings, out of which waviness stands."""
+    """Waviness does not stand out from frequencies that the grating explains."""
     rng = np.random.default_rng(seed)
     y, x = 0.1 * np.mgrid[:200, :200]
     heights = 0.1 * np.cos(2.0 * np.pi * x)

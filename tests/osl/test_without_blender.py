@@ -1,6 +1,6 @@
 """blender_material.py without Blender: refusals in one line, and the materials that it rebuilds.
 
-A folder's own materials of a .blend file are rebuilt, and those of other folders stay.
+A folder's own materials of a .blend file are rebuilt, and other folders' materials stay.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Values for a scene that are not its parameters: of its surfaces, its camera and its samples."""
+"""Values of a scene's surfaces, camera and samples, beside the scene's own parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a table answers, at places and in powers too; and what it knows of itself."""
+"""Look-ups in a table, at places and in powers, and the table's description of itself."""
 
 from __future__ import annotations
 

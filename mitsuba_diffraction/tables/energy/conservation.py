@@ -22,7 +22,7 @@ import numpy as np
 
 from ...arrays import Real, Single
 from ...optics.paths import Path
-from ..directional import DirectionalTable, DirectionGrid
+from ..directional import DirectionalTable, DirectionGrid, LinearMap
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import Record, cached, key_of
 from ..table import DiffractionTable
@@ -30,7 +30,7 @@ from .conserved import Reflector, Transmitter
 from .gain import thick
 from .scaling import lowered, parallel, scaled, weighted
 from .settings import VERSION, energy_settings
-from .transport import ScatteredLight, ScatteredOrders, Transport
+from .transport import ScatteredOrders, Transport
 
 #: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
 #: 1/cosθ or faster, and the plugin attenuates scaled light.
@@ -99,6 +99,37 @@ def _scattered(table: DiffractionTable, *arguments: Any) -> ScatteredOrders:
     for old in list(kept)[:-_KEPT]:
         kept.pop(old, None)
     return found
+
+
+@dataclass(frozen=True)
+class ScatteredLight:
+    """Light of one wavelength that a surface sends on from directions (t, p) of each side.
+
+    Sums have the shape (sides, t, p), weights and scales (sides, polar + 1, azimuthal).
+
+    Attributes
+    ----------
+    paths : of the light.
+    here : interpolation from the grid of the weights to the directions.
+    """
+
+    paths: list[Transport]
+    here: LinearMap
+
+    def sums(self, weights: Single) -> Single:
+        """Return the light of all orders for weights."""
+        sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
+        for path in self.paths:
+            sums[path.came] += path(weights[path.left])
+        return sums
+
+    def sent(self, s: Single) -> Single:
+        """Return the light of all orders, scaled by s at both ends."""
+        return self.at_directions(s) * self.sums(s)
+
+    def at_directions(self, scale: Single) -> Single:
+        """Interpolate a scale to the directions, (sides, t, p)."""
+        return np.stack([self.here(side) for side in scale])
 
 
 class SurfaceEnergy:
@@ -198,11 +229,15 @@ class SurfaceEnergy:
 
         It has fewer directions than its scale, and fewer wavelengths. Of light that goes on beneath
         it has a wavelength for each of a film's `fringes` at least, and more polar angles where
-        light is totally reflected: over the half of a lobe the albedo rises to 1 there.
+        light is totally reflected: the albedo rises to 1 there within half a lobe.
         """
         coarse = self._grid.half
         wavelengths = albedo_wavelengths(wavelength_range, fringes if beneath else 0)
-        if beneath and isinstance(self.material, Reflector) and self.material.total(wavelengths):
+        if (
+            beneath
+            and isinstance(self.material, Reflector)
+            and self.material.total(self.material.index(wavelengths))
+        ):
             coarse = DirectionGrid(self._settings.total_polar, coarse.azimuthal)
         theta = np.concatenate([coarse.theta, GRAZING])
         lights = self._lights(wavelengths, theta, coarse.phi)

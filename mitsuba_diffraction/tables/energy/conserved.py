@@ -18,8 +18,8 @@ from ...optics.stack import Stacked
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | Stacked | None"]
-#: Cosine of light by which a material that reflects totally is told: from 89° on is too late.
-_GRAZING = 0.0175
+#: Cosine of 89°: a critical angle closer to the horizon does not matter.
+_LAST_COSINE = 0.0175
 #: Wavelengths at which a material is told from another.
 PROBES = 24
 
@@ -56,12 +56,14 @@ class Reflector:
         index = rounded(self.index(np.geomspace(*wavelength_range, PROBES)))
         return [self.model, index, self.coat]
 
-    def total(self, wavelengths: Real) -> bool:
-        """Whether light of wavelengths (nm) from above is totally reflected from some angle on."""
-        index: Any = self.index(wavelengths)
+    def total(self, index: Any) -> bool:
+        """Whether light from above is totally reflected from some angle on.
+
+        index : of the material at wavelengths (n,), as `index` returns it.
+        """
         if index is None:
             return False
-        within = cosine_within(np.array(_GRAZING), np.array(self.coat))
+        within = cosine_within(np.array(_LAST_COSINE), np.array(self.coat))
         return bool(fresnel.reflectance(within, index[:, None]).max() > 1.0 - 1e-9)
 
     def phase(self, wavelength_range: tuple[float, float]) -> float:

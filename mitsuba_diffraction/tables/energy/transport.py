@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -38,8 +37,8 @@ from .settings import energy_settings
 #: The weak orders are smoothed by this share of the distance between rings, at least. Orders that
 #: have wider lobes are all in the density: with 0.6 of the distance their sums were 7 % off.
 SMOOTHING = 1.0
-#: Weak orders of less power in all are left out; of less in Kirchhoff's model, whose orders that
-#: graze the horizon, as the light does, gain as 1/(cosθi cosθo): 2.5e-5 was 0.2 of it at 89.5°.
+#: Weak orders of less power in all are left out. Kirchhoff's orders that graze the horizon gain as
+#: 1/(cosθi cosθo) in grazing light: a power of 2.5e-5 sent on 0.2 of the light at 89.5°.
 LEAST_WEAK, LEAST_GRAZING = 2e-3, 1e-6
 
 #: Width of order 0's lobe, in distances between rings, above which all directions are summed over:
@@ -252,8 +251,8 @@ class Transport:
     ) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the weak orders' light.
 
-        It is linear between directions of half the grid, more about the critical angle, where it
-        has a cusp, and those beyond the grid, where it may be as 1/cosθ.
+        The light is summed at directions of half the grid, about the critical angle, where it has
+        a cusp, and beyond the grid, where it may grow as 1/cosθ; it is linear in between.
         """
         half = self._orders.incidence(grid.half, self._k)
         near = math.asin(self._path.critical_sine) + _NEAR_CRITICAL
@@ -381,34 +380,3 @@ def _blocks(count: int, width: int) -> list[slice]:
     """Slices of rows of a width: pairs that are looked at together."""
     rows = max(1, _PAIRS // width)
     return [slice(first, first + rows) for first in range(0, count, rows)]
-
-
-@dataclass(frozen=True)
-class ScatteredLight:
-    """Light of one wavelength that a surface sends on from directions (t, p) of each side.
-
-    Sums have the shape (sides, t, p), weights and scales (sides, polar + 1, azimuthal).
-
-    Attributes
-    ----------
-    paths : of the light.
-    here : interpolation from the grid of the weights to the directions.
-    """
-
-    paths: list[Transport]
-    here: LinearMap
-
-    def sums(self, weights: Single) -> Single:
-        """Return the light of all orders for weights."""
-        sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
-        for path in self.paths:
-            sums[path.came] += path(weights[path.left])
-        return sums
-
-    def sent(self, s: Single) -> Single:
-        """Return the light of all orders, scaled by s at both ends."""
-        return self.at_directions(s) * self.sums(s)
-
-    def at_directions(self, scale: Single) -> Single:
-        """Interpolate a scale to the directions, (sides, t, p)."""
-        return np.stack([self.here(side) for side in scale])

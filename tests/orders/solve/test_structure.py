@@ -196,7 +196,7 @@ def test_flat_stacks_reflect_as_transfer_matrices_say(solver):
             theta = np.arcsin(np.hypot(c * sine, y))
             powers = [tmm.coh_tmm(name, indices, depths, theta, lam)["R"] for name in "sp"]
             row = (np.abs(amplitudes[n, channel, :, channel]) ** 2).sum()
-            # rounding; both polarisations together, since axes along the grooves are not s and p
+            # rounding; both polarisations together: along the grooves s and p mix
             assert row == pytest.approx(sum(powers), abs=1e-9)
 
 
@@ -231,7 +231,7 @@ def test_films_move_a_profile(profile):
     same = thick.station(1, 0, 0.35, 0.5, [0.5])
     expected = Chandezon(profile, 12).amplitudes(station)
     got = Chandezon(profile, 12, thick.structure).amplitudes(same)
-    # e⁻⁴⁵ of the light reaches the glass; phases are those of a moved profile
+    # e⁻⁴⁵ of the light reaches the glass; a moved profile gives these phases
     assert np.abs(np.abs(got) - np.abs(expected)).max() < 1e-6
     air = filmed(profile, [(str(SUPERSTRATE), 0.07)])
     aired = replace(station, media=air.station(1, 0, 0.35, 0.5, [0.5]).media)

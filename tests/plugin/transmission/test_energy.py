@@ -1,4 +1,4 @@
-"""Surfaces that let light through: all of it is sent on, and samples are as dense as is said."""
+"""Surfaces that let light through: they send on all light, and samples are as dense as `pdf`."""
 
 from __future__ import annotations
 

@@ -194,5 +194,5 @@ def test_metal_is_not_black_beside_a_floor(gl: Any, some_variant: str) -> None:
         shares.append(dark_region(full, light.image[..., :3]))
         light.release()
     renderer.release()
-    assert shares[0] > 0.05  # the scene is a test of it
+    assert shares[0] > 0.05  # the scene has such light
     assert shares[1] < 0.05
