@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -11,6 +13,8 @@ from .arithmetic import Number, of
 
 #: A window of `coherence_width` spans four standard deviations of its amplitude.
 WIDTHS_PER_SIGMA = 4.0
+#: Tables of directions end at this polar angle, rad.
+LAST_ANGLE = math.radians(89.5)
 # Smallest normal number of single precision
 _SMALLEST = float(np.finfo(np.float32).tiny)
 
@@ -92,3 +96,15 @@ def vcavity(cos_i: Number, cos_o: Number, one_plus_dot: Number) -> Number:
     xp = of(cos_i, cos_o, one_plus_dot)
     edge = xp.maximum(one_plus_dot, _SMALLEST)
     return xp.minimum(1.0, 2.0 * (cos_i + cos_o) * xp.minimum(cos_i, cos_o) / edge)
+
+
+def horizon_attenuation(cosine: Number) -> Number:
+    """Return the factor on light near the horizon where a surface has a scale of energy.
+
+    An albedo above 1 there rises as 1/cosθ, or faster (wide lobes), and tables of directions end.
+
+    cosine : of the angle to the normal, above 0.
+    """
+    xp = of(cosine)
+    near = xp.clip(cosine * (1.0 / math.cos(LAST_ANGLE)), 0.0, 1.0)
+    return near * xp.sqrt(near)

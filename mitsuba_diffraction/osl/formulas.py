@@ -16,6 +16,7 @@ from ..optics.coat import (
     refracted,
 )
 from ..optics.fresnel import reflectance
+from ..optics.geometry import horizon_attenuation
 from ..optics.orders import (
     cell_wavelengths,
     order_cell,
@@ -69,6 +70,7 @@ def patch_formulas(model: Model | None, coated: bool = False) -> str:
         program.add(refracted, "vector", "float")
         for formula in (face_transmittance, coated_reflectance, cosine_within):
             program.add(formula, "float", "float")
+    program.add(horizon_attenuation, "float")
     flat = reflectance if model is not None else _everything
     program.add(flat, "float", "complex", name="flat_reflectance")
     return _COMPLEX + program.text

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..arrays import Single
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
-from ..tables.directional import LAST_ANGLE, SHARE, DirectionalTable
+from ..tables.directional import SHARE, DirectionalTable
 from .arithmetic import clip, float_of, index_of
 from .directions import Site
 from .energy_factors import ScaleRange
@@ -143,17 +143,6 @@ class DirectionLookup:
         # no farther, where values might become negative; derivatives at the ends are as inside
         share = clip(share - lower, -0.01, 1.01)
         return [dr.lerp(*both, share) for both in zip(*ends, strict=True)]
-
-
-def at_horizon(cosine: Float) -> Float:
-    """Factor on light within half a degree of the horizon, where tables of directions end.
-
-    An albedo above 1 there rises as 1/cosθ, or faster (wide lobes).
-
-    cosine : of the angle to the normal, above 0.
-    """
-    near = clip(cosine * (1.0 / math.cos(LAST_ANGLE)), 0.0, 1.0)
-    return near * dr.sqrt(near)
 
 
 def scales_of(

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..optics import fresnel
 from ..optics.coat import coated_reflectance, cosine_within
+from ..optics.geometry import horizon_attenuation
 from ..optics.stack import Stacked
 from ..progress import show
 from ..tables import DiffractionTable
@@ -28,7 +29,7 @@ from ..tables.energy import conserved
 from ..tables.energy.conservation import Conservation, Energy, albedo_wavelengths
 from .arithmetic import plain
 from .boundary import Boundary
-from .direction_lookup import DirectionLookup, at_horizon, between, ones_like, scales_of
+from .direction_lookup import DirectionLookup, between, ones_like, scales_of
 from .directions import Site
 from .energy_factors import ScaleRange
 from .layers import Thickness
@@ -163,7 +164,7 @@ class EnergyModel:
             if self._scale is not None:
                 product *= mi.UnpolarizedSpectrum(self._scale.at(direction, site))
             cosine = mi.Frame3f.cos_theta(direction)
-            horizon *= at_horizon(dr.abs(cosine) if self._both_sides else cosine)
+            horizon *= horizon_attenuation(dr.abs(cosine) if self._both_sides else cosine)
         return product * horizon
 
     def albedo_excess(self, direction: Vector3f, site: Site) -> Colour:

@@ -80,6 +80,7 @@ class Program:
             if any(id(part) in changing for part in symbol.parts):
                 changing.add(id(symbol))
         read = [part for s in _needed(results.values()) if id(s) in changing for part in s.parts]
+        read += [part for result in results.values() for part in _parts(result)]
         ready = {id(s): s for s in read if isinstance(s, Symbol) and id(s) not in changing}
         stored = {f"pair_{s.name or n}": s for n, s in enumerate(ready.values())}
         float_ = self.dialect.types["float"]

@@ -12,9 +12,8 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Real, Single
+from ..optics.geometry import LAST_ANGLE
 
-#: The grid ends at this polar angle, rad; values beyond are those at its end.
-LAST_ANGLE = math.radians(89.5)
 #: x = (1 − √(1 − 2θ/π)) / SHARE runs from 0 to 1 over the grid: denser towards grazing angles.
 SHARE = 1.0 - math.sqrt(1.0 - LAST_ANGLE / (0.5 * math.pi))
 
@@ -23,7 +22,7 @@ SHARE = 1.0 - math.sqrt(1.0 - LAST_ANGLE / (0.5 * math.pi))
 class DirectionGrid:
     """Grid of `polar` + 1 polar angles, from 0 to `LAST_ANGLE`, and `azimuthal` azimuths from 0.
 
-    Values on it have the shape (polar + 1, azimuthal).
+    Values on it have the shape (polar + 1, azimuthal); those at its end hold beyond.
     """
 
     polar: int

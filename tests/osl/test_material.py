@@ -18,6 +18,8 @@ from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
 from tests.support import ROOT
 from tests.support.blender import blender, result_of, run_in_blender
 from tests.support.cycles import plane_seen
+from tests.support.directions import polar
+from tests.support.lanes import interaction, lanes, spectra
 from tests.support.orders import thin_grating
 
 pytestmark = pytest.mark.thorough
@@ -300,3 +302,25 @@ def facing(view: View) -> np.ndarray:
     towards /= np.linalg.norm(towards, axis=-1, keepdims=True)
     whole = np.abs(np.linalg.norm(place, axis=-1) - 1.0) < 0.02
     return np.where(whole, np.sum(normal * towards, axis=-1), 0.0)
+
+
+def test_scaled_light_is_that_of_the_plugin_up_to_the_horizon(tmp_path):
+    """Of a surface whose albedo exceeds 1: wide lobes, which the scale changes across."""
+    mi.set_variant("llvm_ad_spectral")
+    rng = np.random.default_rng(3)
+    rough = md.HeightField(0.02 * rng.normal(size=(96, 96)), 0.08)
+    surface = md.bsdf_dict(rough, coherence_width=6.0, material="none")
+    bsdf = mi.load_dict(surface)
+    tilts = [70.0, 88.0, 89.8]
+    seen = plane_seen(md.osl.export(bsdf, tmp_path), tilts, samples=512)
+    n, rng = 1 << 16, np.random.default_rng(1)
+    for theta, found, error in zip(tilts[:2], seen.mean, seen.error, strict=False):
+        wi = np.tile(polar(theta, 0.0), (n, 1))
+        si = interaction(wi, np.tile([*RGB_WAVELENGTHS, RGB_WAVELENGTHS[-1]], (n, 1)))
+        _, weight = bsdf.sample(
+            mi.BSDFContext(), si, lanes(rng.random(n)), mi.Point2f(*map(lanes, rng.random((2, n))))
+        )
+        expected = spectra(weight).mean(axis=0)[:3]
+        # one direction stands for a lobe of 3°; without it 0.15 of the light at 88° was missing
+        assert np.all(np.abs(found - expected) < 0.05 + 4.0 * error), (theta, found, expected)
+    assert np.all(seen.mean[-1] < 0.8)  # attenuated, where there is 1.6 to 4.4 without a scale

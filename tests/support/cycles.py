@@ -50,7 +50,7 @@ for degrees in tilts:
             tree.links.new(tangent.outputs[0], socket)
     end = tree.nodes.new("ShaderNodeOutputMaterial")
     tree.links.new(bsdf, end.inputs["Surface"])
-    bpy.ops.mesh.primitive_plane_add(size=100)
+    bpy.ops.mesh.primitive_plane_add(size=1000)
     bpy.context.object.data.materials.append(material)
     world = scene.world = bpy.data.worlds.new("sky")
     nodes, links = world.node_tree.nodes, world.node_tree.links
@@ -69,7 +69,7 @@ for degrees in tilts:
     sink = nodes.new("ShaderNodeOutputWorld")
     links.new(background.outputs[0], sink.inputs["Surface"])
     tilt = math.radians(degrees)
-    # the camera looks from x, all of it above the plane also from 89°
+    # the camera looks from x, and sees nothing but the plane up to 89.9°
     place = (40 * math.sin(tilt), 0, 40 * math.cos(tilt))
     bpy.ops.object.camera_add(location=place, rotation=(0, tilt, 0))
     scene.camera = bpy.context.object

@@ -37,13 +37,17 @@ def pairs(count: int) -> Pairs:
     return Pairs(wi, wo, kappa, 2e-3 * rng.random(count))
 
 
-def exact_power(given: Pairs, index: complex, *, coated: bool = False) -> Array:
-    """Return N' of small slope by `md.reference` in double precision, (n,)."""
+def exact_power(
+    given: Pairs, index: complex, *, coated: bool = False, name: str = "small_slope"
+) -> Array:
+    """Return N' of a boundary model by `md.reference` in double precision, (n,)."""
     wi, wo = given.wi, given.wo
     n = COAT if coated else 1.0
     inner = [coat.refracted(w, n) for w in (wi, wo)] if coated else [wi, wo]
     relative = np.full(len(wi), index / n)
     s = model.small_slope_weight(given.kappa, given.variance, relative)
+    if name == "kirchhoff":
+        s = np.zeros_like(s)
     jones = model.blended(*inner, relative, s)
     if coated:
         jones = coat.transmitted(jones, wi, wo, n, relative)

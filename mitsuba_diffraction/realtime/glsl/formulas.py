@@ -18,7 +18,7 @@ from ...optics.coat import (
 from ...optics.colour import encoded_colour
 from ...optics.display import shown_colour
 from ...optics.fresnel import reflectance
-from ...optics.geometry import vcavity
+from ...optics.geometry import horizon_attenuation, vcavity
 from ...optics.mirror import horizon_correction, mirror_cosine
 from ...optics.orders import (
     cell_wavelengths,
@@ -45,6 +45,7 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "ORDER_0": {horizon_correction: 3, mirror_cosine: 4},
     "COATED": {face_transmittance: 2, cosine_within: 2, coated_reflectance: 2},
     "VCAVITY": {vcavity: 3},
+    "ENERGY_CONSERVING": {horizon_attenuation: 1},
 }  # fmt: skip
 #: Macros of the shaders that a variable of a formula could be called.
 _MACROS = frozenset({"PI", "PAGE", "TEXELS"})

@@ -24,10 +24,10 @@ import numpy as np
 import scipy
 
 from ...arrays import Real, Single
-from ...optics.geometry import wavenumber
+from ...optics.geometry import LAST_ANGLE, wavenumber
 from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
 from ...optics.paths import Path
-from ..directional import LAST_ANGLE, DirectionGrid, LinearMap, Quadrature, quadrature
+from ..directional import DirectionGrid, LinearMap, Quadrature, quadrature
 from ..order_mixture import NARROW, order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable

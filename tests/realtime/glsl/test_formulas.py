@@ -18,10 +18,11 @@ PAIRS = pairs(4000)
 
 @pytest.mark.parametrize("coated", [False, True], ids=["bare", "coated"])
 @pytest.mark.parametrize("kind", INDICES)
-def test_boundary_is_that_of_the_reference(gl: Any, kind: str, coated: bool) -> None:
+@pytest.mark.parametrize("name", MODELS)
+def test_boundary_is_that_of_the_reference(gl: Any, name: str, kind: str, coated: bool) -> None:
     index = INDICES[kind]
-    found = shaded(gl, PAIRS, MODELS["small_slope"], index, coated)
-    check(found, exact_power(PAIRS, index, coated=coated))
+    found = shaded(gl, PAIRS, MODELS[name], index, coated)
+    check(found, exact_power(PAIRS, index, coated=coated, name=name))
 
 
 def test_model_that_branches_on_values_is_refused(monkeypatch: Any) -> None:

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from mitsuba_diffraction import DiffractionTable, reference
+from mitsuba_diffraction import DiffractionTable, HeightField, bsdf_dict, reference
 from mitsuba_diffraction.optics.display import VIEWS, shown
 from mitsuba_diffraction.plugin.description import Surface
+from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.maps import axis_map
 from mitsuba_diffraction.realtime.glsl.modelled import Modelled
 from mitsuba_diffraction.realtime.glsl.packing import pack_colours
@@ -26,8 +27,9 @@ from mitsuba_diffraction.realtime.glsl.shader_materials import (
 from mitsuba_diffraction.realtime.glsl.source import display_definitions, plain_source
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour import cached_colours
-from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed
+from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed, shaded
 from tests.support.descriptions import CHANGES, ELSEWHERE, base
+from tests.support.directions import polar
 from tests.support.kinds import COATED, SLOPE
 from tests.support.lanes import interaction, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
@@ -53,6 +55,30 @@ def test_a_stretched_patch_under_a_coat_has_the_reference_s_light(gl: Any) -> No
     for part in (near, ~near):
         # cut windows, and a conductor's index between 96 wavelengths
         assert difference(found[part], expected[part]) < 5e-3
+
+
+@pytest.mark.parametrize("given", [{"material": "none"}, {"int_ior": 1.8, "model": "kirchhoff"}])
+def test_scaled_light_vanishes_at_the_horizon(
+    gl: Any, patch: HeightField, given: dict[str, Any]
+) -> None:
+    """As in the plugin: beyond the tables' last angle an albedo above 1 rises on."""
+    mi.set_variant("llvm_ad_rgb")
+    rng = np.random.default_rng(5)
+    wi = np.array([polar(*rng.uniform((50, 0), (85, 360))) for _ in range(300)])
+    factors = []
+    for theta in (89.0, 89.7, 89.9):
+        wo = np.array([polar(theta, phi) for phi in rng.uniform(0, 360, 300)])
+        si, light = interaction(wi, np.zeros((300, 4))), []
+        for conserving in (False, True):
+            surface = bsdf_dict(patch, coherence_width=6.5, energy_conserving=conserving, **given)
+            bsdf = mi.load_dict(surface)
+            expected = np.array(bsdf.eval(mi.BSDFContext(), si, vectors(wo)))[1]
+            light.append((shaded(gl, make_shader(bsdf, ["fast"]), wi, wo)[:, 1], expected))
+        found, expected = (after.sum() / before.sum() for before, after in zip(*light, strict=True))
+        # one scale for all colours here, and one for each there
+        assert_allclose(found, expected, rtol=0.02)
+        factors.append(found)
+    assert factors[2] < 0.1 < 0.7 < factors[0]
 
 
 def test_colours_of_one_window_are_read_as_they_are(gl: Any) -> None:

@@ -13,6 +13,10 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
 #ifdef ORDER_0
     mirror_half = sqrt(min(0.5 * one_plus_dot, 1.0));
 #endif
+#ifdef ENERGY_CONSERVING
+    float energy = energy_scale(in_patch(wi, rotation), wi.z)
+                 * energy_scale(in_patch(wo, rotation), wo.z);
+#endif
 #ifdef COATED
     wi = refracted(wi, coat);
     wo = refracted(wo, coat);
@@ -25,8 +29,6 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     begin_pair(wi, wo, outer);
     float mirrored = area * outer.y;  // of order 0, which has no shadowing
 #ifdef ENERGY_CONSERVING
-    float energy = energy_scale(in_patch(wi, rotation), wi.z)
-                 * energy_scale(in_patch(wo, rotation), wo.z);
     outside *= energy;
     mirrored *= energy;
 #endif

@@ -111,11 +111,11 @@ float energy_on_page(int page, vec2 cell)
     return mix(along.x, along.y, t.x);
 }
 
-// Energy scale s of a direction; the tangential part is in the patch's frame.
+// Energy scale s of a direction, less at the horizon; the tangential part is in the patch's frame.
 float energy_scale(vec2 tangential, float cosine)
 {
     vec2 cell = on_grid(tangential, cosine);
-    return ON_PAGES(energy_on_page, cell);
+    return ON_PAGES(energy_on_page, cell) * horizon_attenuation(cosine);
 }
 
 #endif
