@@ -17,6 +17,7 @@ from ..tables.energy.conservation import Energy
 LEAST_SHARE = 0.25
 #: Factors are rounded outwards to powers of 2^(1/8): an optimisation of one waits rarely.
 STEPS_PER_OCTAVE = 8
+_ROUNDING = 1e-4
 
 
 class ScaleRange(NamedTuple):
@@ -62,7 +63,8 @@ class ScaleRange(NamedTuple):
     @property
     def _rounded(self) -> tuple[float, float]:
         low, high = (math.log2(factor) * STEPS_PER_OCTAVE for factor in self._tabulated)
-        ends = math.floor(low), math.ceil(high)
+        # of scales in single precision: the indices of a patch that is not stretched are exact
+        ends = math.floor(low + _ROUNDING), math.ceil(high - _ROUNDING)
         return 2.0 ** (ends[0] / STEPS_PER_OCTAVE), 2.0 ** (ends[1] / STEPS_PER_OCTAVE)
 
     @property
