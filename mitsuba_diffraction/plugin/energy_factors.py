@@ -18,6 +18,7 @@ LEAST_SHARE = 0.25
 #: Factors of an optimisation, and ranges, are rounded outwards to powers of 2^(1/8), so that it
 #: waits rarely. One factor is exact: a film's fringes were 2 % off, and white beneath was 1.07.
 STEPS_PER_OCTAVE = 8
+#: Of steps, for factors in single precision.
 _ROUNDING = 1e-4
 
 
@@ -64,9 +65,9 @@ class ScaleRange(NamedTuple):
     @property
     def _rounded(self) -> tuple[float, float]:
         if self.stretch[0] == self.stretch[1] and not self.differentiable:
-            return self.stretch
+            one = round(self.stretch[0], 6)  # of single precision
+            return one, one
         low, high = (math.log2(factor) * STEPS_PER_OCTAVE for factor in self._tabulated)
-        # of scales in single precision: the indices of a patch that is not stretched are exact
         ends = math.floor(low + _ROUNDING), math.ceil(high - _ROUNDING)
         return 2.0 ** (ends[0] / STEPS_PER_OCTAVE), 2.0 ** (ends[1] / STEPS_PER_OCTAVE)
 
