@@ -181,8 +181,9 @@ class SurfaceEnergy:
         parts = (settings.side_parts if self._both_sides else settings.parts)[few]
         # waves are closer than orders need where a film has fringes
         places = settings.between[few and fringes <= count and not self._both_sides]
+        calm = 0.0 if self._both_sides else settings.calm[few]  # all light is sent on: never calm
         for place in places if len(nodes) > 1 else (0.0,):
-            self._lower_between(nodes, place, parts, settings.calm[few], s)
+            self._lower_between(nodes, place, parts, calm, s)
 
         # light beyond the grid is attenuated wherever there is a scale
         if np.all(s == 1.0) and (self._both_sides or largest <= settings.ceiling):
