@@ -73,6 +73,17 @@ def daylight(wavelength: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(scale * np.interp(np.asarray(wavelength, np.float64), nodes, power))
 
 
+def daylight_shares(wavelengths: ArrayLike) -> NDArray[np.float64]:
+    """Weights (n, 3) of values at wavelengths (n,), nm, in red, green and blue under daylight.
+
+    Values are linear in log λ in between. The weights of a colour add up to 1; some are negative.
+    """
+    light, nodes = np.arange(360.0, 830.5, 2.0), np.log(np.asarray(wavelengths, np.float64))
+    hats = [np.interp(np.log(light), nodes, row) for row in np.eye(len(nodes))]
+    weights = np.stack(hats) @ linear_srgb(response(light))
+    return np.asarray(weights / weights.sum(axis=0))
+
+
 def illuminant_power(name: str, wavelength: ArrayLike) -> NDArray[np.float64]:
     """Relative power of a CIE illuminant, e.g. D55, shape of λ (300 to 780 nm)."""
     import colour

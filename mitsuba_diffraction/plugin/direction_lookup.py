@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Single
-from ..optics.colour import linear_srgb, response
+from ..optics.colour import daylight_shares
 from ..optics.geometry import wavenumber
 from ..tables.directional import SHARE, DirectionalTable
 from .arithmetic import clip, float_of, index_of
@@ -21,9 +21,6 @@ from .energy_factors import ScaleRange
 from .layers import Thickness
 from .memory import index_between, read_record, upload
 from .types import Buffer, Float, Index, Vector2f, Vector3f
-
-#: First wavelength, end and step of integrals over daylight, nm.
-_DAYLIGHT = (360.0, 830.0, 2.0)
 
 
 class DirectionLookup:
@@ -196,7 +193,7 @@ def _cells(table: DirectionalTable, stretch: float, exponent: float) -> Single:
     values = table.values
     if mi.is_rgb and len(values) > 1:
         powers = values**exponent
-        colours = np.tensordot(_sensitivities(table.wavelengths * stretch), powers, 1)
+        colours = np.tensordot(daylight_shares(table.wavelengths * stretch).T, powers, 1)
         # red has negative weights in blue and green: its mean may be beyond all of the light's
         limited = np.clip(colours, powers.min(axis=0), powers.max(axis=0))
         values = np.asarray(limited ** (1.0 / exponent), np.float32)
@@ -206,15 +203,3 @@ def _cells(table: DirectionalTable, stretch: float, exponent: float) -> Single:
     if mi.is_rgb or len(values) == 1:
         return cells
     return np.concatenate([cells[:, :, :-1], cells[:, :, 1:]], axis=-1)
-
-
-def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights of the wavelengths (n,), nm, in red, green and blue, (3, n).
-
-    Weights are integrals over daylight of a function that is linear in log λ between wavelengths.
-    """
-    light = np.arange(*_DAYLIGHT)
-    power = linear_srgb(response(light)).T
-    hats = [np.interp(np.log(light), np.log(wavelengths), row) for row in np.eye(len(wavelengths))]
-    weights = power @ np.stack(hats, axis=1)
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))

@@ -10,6 +10,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import (
     ILLUMINANTS,
     RGB_WAVELENGTHS,
+    daylight_shares,
     delta_e,
     encode_srgb,
     linear_srgb,
@@ -61,6 +62,13 @@ def test_the_wavelengths_of_rgb_are_the_means_of_its_channels():
     weights = linear_srgb(response(EVERY_NM))
     means = (weights * EVERY_NM[:, None]).sum(axis=0) / weights.sum(axis=0)
     assert RGB_WAVELENGTHS == pytest.approx(means, abs=0.1)
+
+
+def test_a_spectrum_s_colour_is_a_sum_over_the_wavelengths_that_it_is_known_at():
+    lam = np.geomspace(380.0, 760.0, 9)
+    weights = linear_srgb(response(EVERY_NM))
+    exact = np.interp(np.log(EVERY_NM), np.log(lam), np.sqrt(lam)) @ weights / weights.sum(axis=0)
+    assert np.sqrt(lam) @ daylight_shares(lam) == pytest.approx(exact, rel=1e-4)  # steps of 2 nm
 
 
 def test_shapes_and_precision_are_kept():

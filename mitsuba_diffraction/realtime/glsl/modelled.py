@@ -85,9 +85,12 @@ class Modelled:
 
 
 def luminous_mean(table: DirectionalTable) -> NDArray[np.float32]:
-    """Average a table over wavelengths as bright as they are, (polar + 1, azimuthal)."""
+    """Average scales s over wavelengths as bright as they are, (polar + 1, azimuthal).
+
+    The mean is that of 1/s², as in the plugin's RGB variants.
+    """
     weights = response(table.wavelengths)[:, 1] * table.wavelengths
-    return np.average(table.values, axis=0, weights=weights).astype(np.float32)
+    return np.average(table.values**-2.0, axis=0, weights=weights).astype(np.float32) ** -0.5
 
 
 def _reflectance(described: Surface) -> Packed:

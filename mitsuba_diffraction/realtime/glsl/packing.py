@@ -13,7 +13,13 @@ from ...arrays import Real
 from ...errors import DiffractionError
 from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
 from ...optics.boundary import Model
-from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
+from ...optics.colour import (
+    RGB_WAVELENGTHS,
+    daylight_shares,
+    linear_srgb,
+    metal_tint,
+    response,
+)
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
 from ...shading.powers import pack_powers as pack_orders
@@ -135,19 +141,10 @@ def pack_beneath(excesses: Sequence[DirectionalTable]) -> Packed:
         return Packed()
     values = np.zeros((len(excesses), FINE.polar + 1, FINE.azimuthal, 4), np.float16)
     for page, excess in zip(values, excesses, strict=True):
-        page[..., :3] = _daylight_mean(excess)
+        shares = daylight_shares(excess.wavelengths)
+        page[..., :3] = np.tensordot(excess.on(FINE).values, shares, (0, 0))
     texture = Texture("beneath", values.reshape(-1, *values.shape[2:]), smooth=True)
     return Packed((texture,), {"energy_page": 0.0}, {"BENEATH": "", **_grid(len(excesses))})
-
-
-def _daylight_mean(table: DirectionalTable) -> Real:
-    """Average over daylight's spectrum: linear sRGB on `FINE`, linear between the wavelengths."""
-    place = np.interp(
-        np.log(_LAM), np.log(table.wavelengths), np.arange(len(table.wavelengths), dtype=float)
-    )
-    shares = np.maximum(1.0 - np.abs(place - np.arange(len(table.wavelengths))[:, None]), 0.0)
-    pages = [table.at(FINE.theta[:, None], FINE.phi, nm) for nm in table.wavelengths]
-    return np.tensordot(np.stack(pages, axis=-1), shares @ daylight_weights(_LAM), 1)
 
 
 def daylight_weights(wavelengths: Real, relative: Real | float = 1.0) -> Real:
