@@ -28,6 +28,8 @@ STDOUT = Path("-")
 _UNITS = {"pixel_size": "µm", "extent": "µm", "range": "µm", "rms_height": "µm"}
 _SUFFIXES = {"_um": "µm", "_nm": "nm", "_mb": "MB", "_s": "s", "_deg": "°"}
 _SHAPE = "shape"
+#: Suffixes of files that commands write: a folder that is to be made has none of them.
+_OF_FILES = frozenset({".csv", ".exr", ".glsl", ".html", ".json", ".md", ".npz", ".png", ".toml"})
 _INDENT = "  "
 
 
@@ -150,6 +152,10 @@ def _check_folder(path: Path, make_folder: bool) -> None:
     folder = path.parent
     if make_folder and folder.exists() and not folder.is_dir():
         raise DiffractionError(f"cannot write to '{folder}': it is a file; name a folder")
+    if make_folder and not folder.exists() and folder.suffix.lower() in _OF_FILES:
+        raise DiffractionError(
+            f"cannot write to '{folder}': the command writes several files; name a folder"
+        )
     while make_folder and not folder.exists() and folder != folder.parent:
         folder = folder.parent
     try:

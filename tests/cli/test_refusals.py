@@ -76,6 +76,7 @@ REFUSED = {
         "--group a=grating.npy --group b=nothere": "'nothere' does not exist",
     },
     "survey": {"nothere": "'nothere' does not exist"},
+    "survey grating.npy": {"-o out.csv": "writes several files; name a folder"},
     "survey grating.npy -o out": {
         "--pixel-size 0.08 --coat-ior 0.5": "coat_ior=0.5 must be",
         "--material kerratin": "kerratin",

@@ -96,8 +96,10 @@ def test_scans_without_colours_and_in_other_units_are_said_in_full(run, here, he
     assert said in ran.err
 
 
-@pytest.mark.parametrize("command", ["spectrum", "survey"])
-def test_results_of_an_earlier_run_beside_the_scans_are_left_out(run, scans, monkeypatch, command):
+@pytest.mark.parametrize(("command", "suffix"), [("spectrum", ".csv"), ("survey", "")])
+def test_results_of_an_earlier_run_beside_the_scans_are_left_out(
+    run, scans, monkeypatch, command, suffix
+):
     """As a shell names them for `spectrum *`, and in a folder."""
     monkeypatch.chdir(scans)
     for words in (["scan0.npy", "--observer", "dog"], ["--group", "a=scan?.npy"]):
@@ -105,10 +107,11 @@ def test_results_of_an_earlier_run_beside_the_scans_are_left_out(run, scans, mon
     results = sorted(name for name in os.listdir() if not name.endswith(".npy"))
     assert len(results) == 9, results
     for n, names in enumerate([sorted(os.listdir()), ["."]]):
-        ran = run(command, *names, *PIXEL, *QUICK[:2], "-o", scans.parent / f"{n}.csv")
+        ran = run(command, *names, *PIXEL, *QUICK[:2], "-o", scans.parent / f"{n}{suffix}")
         assert ran.code == 0, ran.err
         assert all(name in ran.err for name in results)
-    line = run(command, *results[:2], *PIXEL, "-o", scans.parent / "b.csv").failed_in_one_line()
+    ran = run(command, *results[:2], *PIXEL, "-o", scans.parent / f"b{suffix}")
+    line = ran.failed_in_one_line()
     assert f"'{results[0]}' is a plot or table of results, and no scan" in line
 
 
