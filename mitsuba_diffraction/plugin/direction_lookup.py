@@ -35,6 +35,8 @@ class DirectionLookup:
     thickness : of a film; `nodes` are thicknesses then, nm.
     fringes : whether a value between wavelengths is that of the same fringe at both, of a film of
         the same share of the wavelength. At the same thickness fringes would be missed.
+    filmed : whether the material has a film: pages are those of the light's fringe then, on a patch
+        of the mean stretch, where the stretch varies.
     exponent : of the mean over a colour's light. That of scales s is −2: an albedo a asks for
         s = 1/√a, so a colour's mean of s² a is 1 where 1/s² is the colour's albedo.
     """
@@ -48,9 +50,11 @@ class DirectionLookup:
         *,
         fringes: bool = False,
         exponent: float = 1.0,
+        filmed: bool = False,
     ) -> None:
         height_scale, varies = scales.height_scale, scales.varies or thickness is not None
         self._thickness, self._fringes = thickness, fringes and thickness is not None
+        self._mean_stretch = scales.centre if filmed else None
         cells = partial(_cells, stretch=scales.centre, exponent=exponent)
         maps = np.stack([[cells(side) for side in sides] for sides in tables])
         self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
@@ -98,8 +102,9 @@ class DirectionLookup:
             last = self._pages - 1
             return [pages(mi.UInt32(min(n, last)))[0] for n in range(len(wavenumbers))]
         values = []
+        stretch = frame.stretch if self._mean_stretch is None else self._mean_stretch
         for k in wavenumbers:
-            at = (self._first - dr.log2(k * frame.stretch)) * self._pages_per_log
+            at = (self._first - dr.log2(k * stretch)) * self._pages_per_log
             n = index_of(index_between(at, 0.0, self._pages - 1.0))
             within = clip(at - float_of(n), 0.0, 1.0)
             if self._fringes:  # at thicknesses d λn/λ

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -102,6 +103,7 @@ class EnergyModel:
             self._thickness.beyond = second / first
         materials = self._materials_of(factors.centre, self._range)
         self._both_sides = isinstance(materials[0], conserved.Transmitter)
+        self._filmed = materials[0].phase(wavelengths) > 0.0
         # many thicknesses, at each fringe, would take minutes: see `DirectionLookup`
         fringes = self.beneath and self._thickness is None
         self._energies = [
@@ -121,20 +123,30 @@ class EnergyModel:
             nodes, excesses = self._nodes(_excess_of)
             assert excesses is not None
             self._excess = DirectionLookup(
-                excesses, nodes, factors, self._thickness, fringes=mi.is_spectral
-            )
+                excesses, nodes, factors, self._thickness,
+                fringes=mi.is_spectral, filmed=self._filmed,
+            )  # fmt: skip
 
     def _nodes(
         self, sides_of: SidesOf
     ) -> tuple[list[float], Sequence[Sequence[DirectionalTable]] | None]:
         """Return nodes, of height scales or thicknesses, nm, and a function's tables at them."""
         if self._thickness is None:
-            (energy,) = self._energies
-            nodes = self._factors.nodes(energy)
-            return nodes, scales_of([sides_of(energy, energy.at(node)) for node in _counted(nodes)])
+            nodes = self._factors.nodes(self._energies[0])
+            energies = _counted([self._at_node(node) for node in nodes])
+            found = zip(energies, nodes, strict=True)
+            return nodes, scales_of([sides_of(each, each.at(node)) for each, node in found])
         height, energies = self._factors.height_scale, _counted(self._energies)
         thicknesses = np.linspace(*self._thickness.tabulated, len(self._energies)).tolist()
         return thicknesses, scales_of([_at_height(each, sides_of, height) for each in energies])
+
+    def _at_node(self, height_scale: float) -> Energy:
+        """Return the energy with the indices of the light at the stretch of a height scale."""
+        (energy,), stretch = self._energies, self._factors.stretch_at(height_scale)
+        if stretch == self._factors.centre or (self._filmed and self.beneath):
+            return energy
+        (material,) = self._materials_of(stretch, self._range)
+        return replace(energy, material=material)
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""

@@ -2,8 +2,8 @@
 
 A patch stretched by a reflects light of wavelength λ as the patch itself, with heights divided by
 a, reflects light of λ/a: all lengths are divided by a. So the tables of the unstretched patch serve
-it too, at other wavelengths and height scales. Indices are exact at the factor
-`centre`.
+it too, at other wavelengths and height scales. Indices are exact at one factor for each height
+scale: at `centre`, or if the heights' factor is one, at what divides it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ LEAST_SHARE = 0.25
 STEPS_PER_OCTAVE = 8
 #: Of steps, for factors in single precision.
 _ROUNDING = 1e-4
+_BEYOND = 1.5
 
 
 class ScaleRange(NamedTuple):
@@ -51,6 +52,14 @@ class ScaleRange(NamedTuple):
         high = self.height_scale
         low = self.heights[0] / self.stretch[1] if self.varies else high
         return scales.nodes(low, high, interval=self.differentiable)
+
+    def stretch_at(self, height_scale: float) -> float:
+        """Return the factor on lengths at a height scale; `centre` if it takes no other."""
+        if self.heights[0] != self.heights[1] or self.stretch[0] == self.stretch[1]:
+            return self.centre
+        low, high = self._rounded
+        # the nodes around a range are a little beyond it, and so are their factors
+        return min(max(self.heights[1] / height_scale, low / _BEYOND), high * _BEYOND)
 
     def wavelengths(self, wavelength_range: tuple[float, float]) -> tuple[float, float]:
         """Return the range λ/a of wavelengths λ, nm."""

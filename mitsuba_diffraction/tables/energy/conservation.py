@@ -288,9 +288,13 @@ def albedo_wavelengths(wavelength_range: tuple[float, float], least: int = 2) ->
 
 
 def spread(wavelength_range: tuple[float, float], count: int, least: int = 2) -> Real:
-    """Wavelengths (nm) evenly in their logarithm, `count` in an octave or more, or the only one."""
+    """Wavelengths (nm) evenly in their logarithm, `count` in an octave, or the only one.
+
+    All visible light, of 1.2 octaves, has `count`; ranges of stretched patches have more.
+    """
     low, high = wavelength_range
-    count = max(math.ceil(count * min(math.log2(high / low), 1.0)), least)
+    octaves = math.log2(high / low)
+    count = max(math.ceil(count * max(min(octaves, 1.0), octaves / 1.25)), least)
     return np.geomspace(low, high, count if high > low else 1)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 54
+VERSION = 55
 
 
 @dataclass(frozen=True)
