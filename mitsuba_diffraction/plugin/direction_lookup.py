@@ -54,7 +54,6 @@ class DirectionLookup:
     ) -> None:
         height_scale, varies = scales.height_scale, scales.varies or thickness is not None
         self._thickness, self._fringes = thickness, fringes and thickness is not None
-        self._mean_stretch = scales.centre if filmed else None
         cells = partial(_cells, stretch=scales.centre, exponent=exponent)
         maps = np.stack([[cells(side) for side in sides] for sides in tables])
         self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
@@ -73,9 +72,11 @@ class DirectionLookup:
         octaves = math.log2(wavelengths[-1] / wavelengths[0])
         self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
         self._logs_per_page = mi.Float(octaves / max(len(wavelengths) - 1, 1))
+        self._filmed, self._mean_stretch = filmed, mi.Float(scales.centre)
         dr.make_opaque(
-            self._low, self._slope, self._first, self._pages_per_log, self._logs_per_page
-        )
+            self._low, self._slope, self._first, self._pages_per_log, self._logs_per_page,
+            self._mean_stretch,
+        )  # fmt: skip
 
     def at(self, direction: Vector3f, site: Site) -> list[Float]:
         """Return the value of each channel for a direction in the shading frame."""
@@ -102,7 +103,7 @@ class DirectionLookup:
             last = self._pages - 1
             return [pages(mi.UInt32(min(n, last)))[0] for n in range(len(wavenumbers))]
         values = []
-        stretch = frame.stretch if self._mean_stretch is None else self._mean_stretch
+        stretch = self._mean_stretch if self._filmed else frame.stretch
         for k in wavenumbers:
             at = (self._first - dr.log2(k * stretch)) * self._pages_per_log
             n = index_of(index_between(at, 0.0, self._pages - 1.0))
