@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 
 import drjit as dr
 import mitsuba as mi
@@ -19,7 +18,7 @@ from .arithmetic import clip, float_of, index_of
 from .directions import Site
 from .energy_factors import ScaleRange
 from .layers import Thickness
-from .memory import index_between, read_record, upload
+from .memory import index_between, read, read_record, upload
 from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 
@@ -35,8 +34,8 @@ class DirectionLookup:
     thickness : of a film; `nodes` are thicknesses then, nm.
     fringes : whether a value between wavelengths is that of the same fringe at both, of a film of
         the same share of the wavelength. At the same thickness fringes would be missed.
-    filmed : whether the material has a film: pages are those of the light's fringe then, on a patch
-        of the mean stretch, where the stretch varies.
+    filmed : whether the material has a film: where the stretch varies, values are those of the
+        light's own fringe at both height scales then, on patches of their stretches.
     exponent : of the mean over a colour's light. That of scales s is −2: an albedo a asks for
         s = 1/√a, so a colour's mean of s² a is 1 where 1/s² is the colour's albedo.
     """
@@ -54,8 +53,9 @@ class DirectionLookup:
     ) -> None:
         height_scale, varies = scales.height_scale, scales.varies or thickness is not None
         self._thickness, self._fringes = thickness, fringes and thickness is not None
-        cells = partial(_cells, stretch=scales.centre, exponent=exponent)
-        maps = np.stack([[cells(side) for side in sides] for sides in tables])
+        stretches = [scales.centre if thickness else scales.stretch_at(node) for node in nodes]
+        pairs = zip(tables, stretches, strict=True)
+        maps = np.stack([[_cells(side, by, exponent) for side in sides] for sides, by in pairs])
         self._sides, self._polar, self._azimuthal, self._pages, self._record = maps.shape[1:]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
@@ -72,11 +72,11 @@ class DirectionLookup:
         octaves = math.log2(wavelengths[-1] / wavelengths[0])
         self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
         self._logs_per_page = mi.Float(octaves / max(len(wavelengths) - 1, 1))
-        self._filmed, self._mean_stretch = filmed, mi.Float(scales.centre)
+        filmed = filmed and varies and thickness is None
+        self._stretches = upload(mi.Float, np.array(stretches, np.float32)) if filmed else None
         dr.make_opaque(
-            self._low, self._slope, self._first, self._pages_per_log, self._logs_per_page,
-            self._mean_stretch,
-        )  # fmt: skip
+            self._low, self._slope, self._first, self._pages_per_log, self._logs_per_page
+        )
 
     def at(self, direction: Vector3f, site: Site) -> list[Float]:
         """Return the value of each channel for a direction in the shading frame."""
@@ -103,18 +103,26 @@ class DirectionLookup:
             last = self._pages - 1
             return [pages(mi.UInt32(min(n, last)))[0] for n in range(len(wavenumbers))]
         values = []
-        stretch = self._mean_stretch if self._filmed else frame.stretch
-        for k in wavenumbers:
+
+        def between(k: Float, stretch: Float, share: Float | None) -> Float:
             at = (self._first - dr.log2(k * stretch)) * self._pages_per_log
             n = index_of(index_between(at, 0.0, self._pages - 1.0))
             within = clip(at - float_of(n), 0.0, 1.0)
             if self._fringes:  # at thicknesses d λn/λ
                 ratios = [dr.exp2((end - within) * self._logs_per_page) for end in (0.0, 1.0)]
                 shares = [(place * ratio - self._low) * self._slope for ratio in ratios]
-                ends = [pages(n, share)[end] for end, share in enumerate(shares)]
-            else:
-                ends = pages(n)
-            values.append(dr.lerp(*ends, within))
+                return dr.lerp(*(pages(n, each)[end] for end, each in enumerate(shares)), within)
+            return dr.lerp(*pages(n, share), within)
+
+        for k in wavenumbers:
+            if self._stretches is None:
+                values.append(between(k, frame.stretch, share))
+                continue
+            lower = index_between(dr.floor(share), 0.0, float(self._last))
+            ends = [lower, lower + 1.0]
+            stretches = [read(mi.Float, self._stretches, index_of(end)) for end in ends]
+            both = [between(k, *end) for end in zip(stretches, ends, strict=True)]
+            values.append(dr.lerp(*both, clip(share - lower, -0.01, 1.01)))
         return values
 
     def _place(self, tangential: Vector2f, cosine: Float) -> tuple[Float, Float]:

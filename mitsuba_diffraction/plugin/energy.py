@@ -103,7 +103,7 @@ class EnergyModel:
             self._thickness.beyond = second / first
         materials = self._materials_of(factors.centre, self._range)
         self._both_sides = isinstance(materials[0], conserved.Transmitter)
-        self._filmed = materials[0].phase(wavelengths) > 0.0
+        filmed = materials[0].phase(wavelengths) > 0.0
         # many thicknesses, at each fringe, would take minutes: see `DirectionLookup`
         fringes = self.beneath and self._thickness is None
         self._energies = [
@@ -117,14 +117,16 @@ class EnergyModel:
                 self._ones = ones_like(scales[0])
             self._scale = (
                 None if scales is None else
-                DirectionLookup(scales, nodes, factors, self._thickness, exponent=-2.0)
+                DirectionLookup(
+                    scales, nodes, factors, self._thickness, exponent=-2.0, filmed=filmed
+                )
             )  # fmt: skip
         if self.beneath:
             nodes, excesses = self._nodes(_excess_of)
             assert excesses is not None
             self._excess = DirectionLookup(
                 excesses, nodes, factors, self._thickness,
-                fringes=mi.is_spectral, filmed=self._filmed,
+                fringes=mi.is_spectral, filmed=filmed,
             )  # fmt: skip
 
     def _nodes(
@@ -143,7 +145,7 @@ class EnergyModel:
     def _at_node(self, height_scale: float) -> Energy:
         """Return the energy with the indices of the light at the stretch of a height scale."""
         (energy,), stretch = self._energies, self._factors.stretch_at(height_scale)
-        if stretch == self._factors.centre or (self._filmed and self.beneath):
+        if stretch == self._factors.centre:
             return energy
         (material,) = self._materials_of(stretch, self._range)
         return replace(energy, material=material)
