@@ -231,7 +231,7 @@ class _Spectrum:
         ring = (np.abs(self.repeats - repeats) < 1.5) & ~line & self.half
         beside = line & (along > 1 / _BESIDE[1]) & (along < 1 / _BESIDE[0])
         beside &= self.repeats < repeats - _LOBE - 0.5  # the lobe lies between two bins
-        # bins that a stronger peak explains are 0, and are no surroundings
+        # a bin that a stronger peak explains is 0, and does not count as background
         seen = (part & (power > 0.0) for part in (ring, beside))
         background = [float(np.median(power[part])) for part in seen if part.any()]
         return _Peak(

@@ -34,8 +34,8 @@ class DirectionLookup:
     thickness : of a film; `nodes` are thicknesses then, nm.
     fringes : whether a value between wavelengths is that of the same fringe at both, of a film of
         the same share of the wavelength. At the same thickness fringes would be missed.
-    filmed : whether the material has a film: where the stretch varies, values are those of the
-        light's own fringe at both height scales then, on patches of their stretches.
+    filmed : whether the material has a film. Where the stretch varies, a value is then interpolated
+        between two height scales at the same wavelength, each on a patch of its own stretch.
     exponent : of the mean over a colour's light. That of scales s is −2: an albedo a asks for
         s = 1/√a, so a colour's mean of s² a is 1 where 1/s² is the colour's albedo.
     """
@@ -72,7 +72,7 @@ class DirectionLookup:
         octaves = math.log2(wavelengths[-1] / wavelengths[0])
         self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
         self._logs_per_page = mi.Float(octaves / max(len(wavelengths) - 1, 1))
-        filmed = filmed and varies and thickness is None
+        filmed = filmed and thickness is None and scales.stretch[0] != scales.stretch[1]
         self._stretches = upload(mi.Float, np.array(stretches, np.float32)) if filmed else None
         dr.make_opaque(
             self._low, self._slope, self._first, self._pages_per_log, self._logs_per_page
@@ -102,7 +102,6 @@ class DirectionLookup:
         if self._record == 4:
             last = self._pages - 1
             return [pages(mi.UInt32(min(n, last)))[0] for n in range(len(wavenumbers))]
-        values = []
 
         def between(k: Float, stretch: Float, share: Float | None) -> Float:
             at = (self._first - dr.log2(k * stretch)) * self._pages_per_log
@@ -114,6 +113,7 @@ class DirectionLookup:
                 return dr.lerp(*(pages(n, each)[end] for end, each in enumerate(shares)), within)
             return dr.lerp(*pages(n, share), within)
 
+        values = []
         for k in wavenumbers:
             if self._stretches is None:
                 values.append(between(k, frame.stretch, share))

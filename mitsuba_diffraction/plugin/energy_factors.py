@@ -20,6 +20,7 @@ LEAST_SHARE = 0.25
 STEPS_PER_OCTAVE = 8
 #: Of steps, for factors in single precision.
 _ROUNDING = 1e-4
+#: Largest share by which the stretch of a height scale may leave the range that is tabulated.
 _BEYOND = 1.5
 
 
@@ -54,11 +55,14 @@ class ScaleRange(NamedTuple):
         return scales.nodes(low, high, interval=self.differentiable)
 
     def stretch_at(self, height_scale: float) -> float:
-        """Return the factor on lengths at a height scale; `centre` if it takes no other."""
+        """Return the factor on lengths at which a height scale's indices are exact.
+
+        It is `centre` where the heights' own factor varies, or the factor on lengths does not.
+        """
         if self.heights[0] != self.heights[1] or self.stretch[0] == self.stretch[1]:
             return self.centre
         low, high = self._rounded
-        # the nodes around a range are a little beyond it, and so are their factors
+        # the first and the last height scale may lie beyond the range of those looked up
         return min(max(self.heights[1] / height_scale, low / _BEYOND), high * _BEYOND)
 
     def wavelengths(self, wavelength_range: tuple[float, float]) -> tuple[float, float]:
