@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Real, Single
+from ...optics.geometry import LAST_ANGLE
 from ...optics.paths import Path
 from ..directional import DirectionalTable, DirectionGrid, LinearMap
 from ..order_mixture import MOST_STRONG, STRONG
@@ -35,6 +36,8 @@ from .transport import ScatteredOrders, Transport
 #: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
 #: 1/cosθ or faster, and the plugin attenuates scaled light.
 GRAZING = np.radians([89.8, 89.9])
+#: Angle beyond the critical one, rad, at which light is all reflected.
+_BEYOND_CRITICAL = 1e-3
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
 _PHASE = 0.8
@@ -175,7 +178,7 @@ class SurfaceEnergy:
             return Conservation(albedo)
         count = settings.side_wavelengths if self._both_sides else settings.wavelengths
         nodes = spread(wavelength_range, count, max(most_fringes, min(count, 4)))
-        lights = self._lights(nodes, grid.theta, grid.phi)
+        lights = self._lights(nodes, self._polar_angles(nodes), grid.phi)
         s = np.stack(parallel(lambda light: self._solved(light()), lights))
         few = 0 < self.orders.strong <= settings.few_orders
         parts = (settings.side_parts if self._both_sides else settings.parts)[few]
@@ -245,6 +248,22 @@ class SurfaceEnergy:
         albedos = np.stack(parallel(lambda light: light().sent(self._ones)[0], lights))
         table = DirectionalTable(wavelengths, albedos[:, : len(coarse.theta)])
         return table, float(albedos.max())
+
+    def _polar_angles(self, wavelengths: Real) -> Real:
+        """Return polar angles that s is found at: the grid's, or one is beyond the critical angle.
+
+        The light of an interface jumps there. Where more is sent on beyond than comes in, a scale
+        that conserves light within would be interpolated across: under 0.5 µm 1.08 was left.
+        """
+        theta, paths = np.array(self._grid.theta), self.material.paths(wavelengths[:1], 0.0)[0]
+        total = min(paths, key=lambda path: path.critical_sine)
+        beyond = math.asin(total.critical_sine) + _BEYOND_CRITICAL
+        if not self._both_sides or beyond > LAST_ANGLE:
+            return theta
+        (make_light,) = self._lights(wavelengths[:1], np.array([beyond]), self._grid.phi)
+        if make_light().sent(self._ones)[total.came.number].max() > 1.0:
+            theta[int(self._grid.row(beyond))] = beyond
+        return theta
 
     def _solved(self, light: ScatteredLight) -> Single:
         """Find s at the grid's directions."""

@@ -113,13 +113,17 @@ class ScatteredOrders:
         return quadrature(*self._directions, critical_sine, upper=True)
 
     def incidence(self, grid: DirectionGrid, k: float) -> DirectionGrid:
-        """Return a grid with azimuths close enough for the weak orders' light of wavenumber k.
+        """Return a grid close enough for the weak orders' light of wavenumber k.
 
         Where lobes are apart, light appears and vanishes over the width of one.
         """
         wanted = 2.0 * math.pi * k / self.mixture.lobe
-        finer = math.ceil(math.log2(max(wanted / grid.azimuthal, 1.0)))
-        return DirectionGrid(grid.polar, grid.azimuthal * 2 ** min(finer, _MOST_HALVED))
+
+        def finer(count: int, wanted: float) -> int:
+            halved = math.ceil(math.log2(max(wanted / count, 1.0)))
+            return int(count * 2 ** min(halved, _MOST_HALVED))
+
+        return DirectionGrid(finer(grid.polar, 0.25 * wanted), finer(grid.azimuthal, wanted))
 
     def order_0(self, kappa: Real) -> Real:
         """Return the power of order 0 at κ over the height scale and `densest`."""

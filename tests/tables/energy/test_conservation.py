@@ -140,6 +140,16 @@ def test_few_wide_orders_leave_at_the_azimuths_and_grazing_angles_of_the_model()
     np.testing.assert_allclose(found[4:], exact[4:], rtol=0.02)
 
 
+def test_few_orders_of_wide_lobes_appear_over_the_width_of_a_lobe():
+    """An infrared blaze of 1.3 µm: one order's light between rows of the grid was up to 0.15 off."""
+    heights, light = 0.36 * np.tile(np.arange(40) / 40.0, (8, 1)), (970.0, 990.0)
+    patch = md.HeightField(heights, 0.0326, periodic=True)
+    table = md.DiffractionTable.build(patch, coherence_width=9.6, wavelength_range=light)
+    exact, found = integrals_and_sums(table, [10.0, 20.0, 47.0], [0.0, 90.0, 198.0], 976.0)
+    # lobes of 2.6° between rows half as far apart, and samples that are read at the nearest
+    np.testing.assert_allclose(found, exact, atol=0.05)
+
+
 @pytest.mark.parametrize("surface", ["grating", "rough"])
 def test_a_dielectric_gains_nothing_and_nothing_is_taken(tables, surface):
     glass = SurfaceEnergy(tables[surface], reflector("small_slope", 1.5))
