@@ -28,8 +28,7 @@ def table_of(
 
     Raises a DiffractionError if no table can be made of the source.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+    with warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         return source.table(settings, progress=progress)
 
 

@@ -91,8 +91,8 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
     files: dict[str, bytes] = {}
     try:
         job.files.require(contents or {})
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DiffractionWarning)  # the row has the table's warnings
+        # the row has the table's warnings
+        with warnings.catch_warnings(action="ignore", category=DiffractionWarning):
             files = _measure(job, row)
     except MissingFiles:
         raise

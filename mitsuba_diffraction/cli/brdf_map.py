@@ -18,7 +18,7 @@ from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
-from .report import Figures, elapsed, output_of
+from .report import Figures, elapsed, exr_and_png, output_of
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -155,8 +155,8 @@ def run(args: argparse.Namespace) -> Figures:
     """Make the map, and return the figures."""
     take_source(args)
     _refuse_contradictions(args)
-    output = output_of(args, Path(f"{args.source.stem}-map.exr"), _files)
-    *exr, png = written = _files(output)
+    output = output_of(args, Path(f"{args.source.stem}-map.exr"), exr_and_png)
+    *exr, png = written = exr_and_png(output)
     if args.spectral and not exr:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
 
@@ -185,12 +185,6 @@ def run(args: argparse.Namespace) -> Figures:
             "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
             "bands": str(bands), "surface": surface, "method": method,
             "seconds": seconds}  # fmt: skip
-
-
-def _files(output: Path) -> list[Path]:
-    """Return the files of -o: an EXR and a PNG beside it, or only a PNG."""
-    png = output if output.suffix.lower() == ".png" else output.with_suffix(".png")
-    return list(dict.fromkeys((output, png)))
 
 
 def _by_bsdf(
@@ -223,8 +217,8 @@ def _notes(args: argparse.Namespace) -> str:
     others = FileKind.TABLE, FileKind.ORDERS, FileKind.RECIPE
     if args.preset is not None or kind_of(args.source) in others:
         return ""
-    with warnings.catch_warnings():  # `surface_bsdf` reads the heights, too
-        warnings.simplefilter("ignore", DiffractionWarning)
+    # `surface_bsdf` reads the heights, too
+    with warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         patch, settings = options.load_patch(args)
         return options.notes(args, patch, TableSettings(**settings))
 
@@ -240,8 +234,7 @@ def _by_method(
     patch, settings = options.load_patch(args)
     if single is not None:
         spectrum = {"wavelength_range": (0.999 * single, 1.001 * single), "step": 0.001 * single}
-    with Bar(args) as bar, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+    with Bar(args) as bar, warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         method = make(
             args.method, patch, period=args.period, progress=bar,
             **settings, **spectrum,

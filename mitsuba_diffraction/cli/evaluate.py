@@ -81,17 +81,27 @@ def run(args: argparse.Namespace) -> Figures:
     """Measure, fit, draw, and return the figures."""
     files = beside(".csv", ".npz")
     written = files(output_of(args, Path(f"{args.source.stem}-evaluation.png"), files))
+    from ..thesis.period_fit.plot import figure, save_csv, save_npz
+
     experiment = _prepared(args)
-    result = _measured(args, experiment)
-    report = [("spectrum", str(grating)) for grating in experiment.gratings] + result.lines
-    _write(args, experiment, result, report, written)
+    response, ridge, fit, lines, figures = _measured(args, experiment)
+    report = [("spectrum", str(grating)) for grating in experiment.gratings] + lines
+    period = figures["fitted_period"] if args.period is None else args.period
+    picture = figure(
+        response, ridge if fit else None, None if math.isnan(period) else period,
+        order=args.order, title=experiment.patch.name,
+        notes="\n".join(f"{name}: {text}" for name, text in report),
+    )  # fmt: skip
+    save_figure(written[0], picture)
+    save_csv(written[1], ridge, period)
+    save_npz(written[2], ridge, period, figures)
     print(
         f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
         f"{experiment.beam}, {counted(experiment.steps.size, 'wavelength')}, "
         f"{counted(experiment.angles.size, 'angle')}, "
         f"{elapsed(args):.1f} s"
     )
-    if distance := _distance(args, result.ridge):
+    if distance := _distance(args, ridge):
         report.insert(len(experiment.gratings) + 1, ("given", distance))
     for name, text in report:
         print(f"  {name:<9} {text}")
@@ -101,8 +111,8 @@ def run(args: argparse.Namespace) -> Figures:
     )
     if notes := options.notes(args, experiment.patch, asked):
         say_warning(notes)
-    figures, beam = result.figures, experiment.beam
-    print(f"  {'period':<9} {_published(result.fit, figures.get('window_error'))}")
+    beam = experiment.beam
+    print(f"  {'period':<9} {_published(fit, figures.get('window_error'))}")
     return {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
             "phi": beam.phi, **figures}  # fmt: skip
 
@@ -143,32 +153,21 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
     return _Experiment(patch, within, {**settings, **spectrum}, gratings, held, beam, steps, angles)
 
 
-class _Result(NamedTuple):
-    """Response of the patch, its ridge of maxima and the fit of the period.
+def _measured(
+    args: argparse.Namespace, experiment: _Experiment
+) -> tuple[Response, Ridge, Fit | None, list[tuple[str, str]], dict[str, Any]]:
+    """Measure and fit the patch, and single windows.
 
-    The ridge is empty and the fit None if no period fits.
-
-    Attributes
-    ----------
-    lines : label and text of each line for people.
-    figures : entries of the NPZ file.
+    Returns the response, its ridge of maxima, the fit of the period, lines to print, each with its
+    label, and entries of the NPZ file. The ridge is empty and the fit None if no period fits.
     """
-
-    response: Response
-    ridge: Ridge
-    fit: Fit | None
-    lines: list[tuple[str, str]]
-    figures: dict[str, Any]
-
-
-def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
-    """Measure and fit the patch, and single windows."""
     from ..heights.coherence import resolved_width
     from ..thesis.period_fit import measure
 
     patch, _, settings, _, held, beam, steps, angles = experiment
-    with Bar(args) as bar, mitsuba_warnings(), warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)  # `options.notes` has them
+    # `options.notes` has them
+    quiet = warnings.catch_warnings(action="ignore", category=DiffractionWarning)
+    with Bar(args) as bar, mitsuba_warnings(), quiet:
         brdf, sigma = _brdf(args, experiment, bar)
         response = measure(
             brdf, beam, steps, angles, sigma=sigma, label=args.method, progress=bar,
@@ -181,7 +180,7 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
                "residual": math.nan if fit is None else fit.residual,
                "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
                "source": str(args.source)}  # fmt: skip
-    return _Result(response, ridge, fit, [("fitted", line), *lines], figures)
+    return response, ridge, fit, [("fitted", line), *lines], figures
 
 
 def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
@@ -208,25 +207,6 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     check_surface(parameters)
     table = table_of(within, within.settings_for(asked, optical_scale(parameters)), bar)
     return partial(brdf_values, bsdf_of(bsdf_dict(table, **parameters))), table.sigma
-
-
-def _write(
-    args: argparse.Namespace, experiment: _Experiment, result: _Result,
-    report: Sequence[tuple[str, str]], written: Sequence[Path],
-) -> None:  # fmt: skip
-    """Write the picture, the ridge (CSV) and everything (NPZ)."""
-    from ..thesis.period_fit.plot import figure, save_csv, save_npz
-
-    response, ridge, fit, _, figures = result
-    period = figures["fitted_period"] if args.period is None else args.period
-    picture = figure(
-        response, ridge if fit else None, None if math.isnan(period) else period,
-        order=args.order, title=experiment.patch.name,
-        notes="\n".join(f"{name}: {text}" for name, text in report),
-    )  # fmt: skip
-    save_figure(written[0], picture)
-    save_csv(written[1], ridge, period)
-    save_npz(written[2], ridge, period, figures)
 
 
 def _distance(args: argparse.Namespace, ridge: Ridge) -> str:

@@ -50,7 +50,8 @@ _SUFFIXES = {
 def run(args: argparse.Namespace) -> Figures:
     """Write the file, and return the figures."""
     take_source(args)
-    output = output_of(args, Path(f"{args.source.stem}.{_default_suffix(args.format)}"))
+    suffix = {"bird": ".json", "csv": ".csv"}.get(args.format, ".bsdf")
+    output = output_of(args, Path(f"{args.source.stem}{suffix}"))
     suffix = output.suffix.lower()
     name = args.format or next(name for name, known in _SUFFIXES.items() if suffix in known)
     if suffix not in _SUFFIXES[name]:
@@ -83,7 +84,3 @@ def run(args: argparse.Namespace) -> Figures:
     return {"source": args.source, "file": output, "format": name, "bytes": size,
             "theta": grid.theta.tolist(), "phi": grid.phi.tolist(),
             "wavelengths": grid.wavelengths.tolist()}  # fmt: skip
-
-
-def _default_suffix(name: str | None) -> str:
-    return {"bird": "json", "csv": "csv"}.get(name or "", "bsdf")

@@ -112,34 +112,25 @@ def _formats(args: argparse.Namespace) -> Figures:
 
 
 def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
-    from ..orders.file import load_orders
-
     file, kind = args.file, source.kind
     if source.recipe is not None:
         return _recipe(source, source.recipe, args)
-    if kind is FileKind.MESH:
-        _refuse_heights_options(args, "a mesh")
-        return _mesh(file)
     if kind is FileKind.SCENE:
         raise DiffractionError(
             f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
             "a scene names: tables, heights (images, NPY, text, instrument files), recipes (TOML) "
             f"and meshes ({', '.join(MESHES)})"
         )
-    if kind is FileKind.TABLE:
-        from ..tables import DiffractionTable
+    if kind not in (FileKind.TABLE, FileKind.ORDERS, FileKind.MESH):
+        return _heights(source, args)
+    options.refuse(args, (*options.HEIGHTS, *_TABLE), f": '{file}' is a {kind}, not heights")
+    if kind is FileKind.MESH:
+        return _mesh(file)
+    from ..orders.file import load_orders
+    from ..tables import DiffractionTable
 
-        _refuse_heights_options(args, "a table")
-        return {"kind": "table", **DiffractionTable.load(file).summary()}
-    if kind is FileKind.ORDERS:
-        _refuse_heights_options(args, "a table of orders")
-        return {"kind": "table of orders", **load_orders(file).summary()}
-    return _heights(source, args)
-
-
-def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
-    names = (*options.HEIGHTS, *_TABLE)
-    options.refuse(args, names, f": '{args.file}' is {kind}, not heights")
+    load: Any = DiffractionTable.load if kind is FileKind.TABLE else load_orders
+    return {"kind": str(kind), **load(file).summary()}
 
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:

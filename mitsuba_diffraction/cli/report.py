@@ -215,6 +215,11 @@ def output_of(
     return output
 
 
+def exr_and_png(output: Path) -> list[Path]:
+    """Return the files of a picture of this name: an EXR and the PNG beside it, or only a PNG."""
+    return [output] if output.suffix.lower() == ".png" else [output, output.with_suffix(".png")]
+
+
 def beside(*suffixes: str) -> Callable[[Path], list[Path]]:
     """Return the function that lists the files of an output: itself, and some of its name."""
     return lambda output: [output, *(output.with_suffix(suffix) for suffix in suffixes)]

@@ -134,7 +134,9 @@ def run(args: argparse.Namespace) -> Figures:
     if args.imports:
         from ..orders.imported import read_orders
 
-        _check_import(args)
+        if args.period is None:
+            args.parser.error("argument --import: needs --period, µm")
+        options.refuse(args, _SOLVED_ONLY, ": is for a solution; --import has efficiencies")
         check_outputs([output])
         period = (args.period, args.period_y) if args.period_y else args.period
         table: OrderTable = read_orders(source, period, superstrate=args.superstrate or 1.0)
@@ -156,13 +158,6 @@ def run(args: argparse.Namespace) -> Figures:
     for label, text in _report(table, output):
         print(f"  {label:<11} {text}")
     return {"file": str(output), **table.summary()}
-
-
-def _check_import(args: argparse.Namespace) -> None:
-    """Refuse an import without its period, or with options of a solution."""
-    if args.period is None:
-        args.parser.error("argument --import: needs --period, µm")
-    options.refuse(args, _SOLVED_ONLY, ": is for a solution; --import has efficiencies")
 
 
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:

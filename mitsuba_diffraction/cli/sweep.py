@@ -65,8 +65,7 @@ def run(args: argparse.Namespace) -> Figures:
         settings["period"] = args.period
     if values is None and args.kind == "method" and gain is not None:
         values = [name for name in options.METHODS if name != "rainbow"]
-    with Bar(args) as bar, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+    with Bar(args) as bar, warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         result = sweep(
             args.kind, patch, light, values=values, method=args.method,
             gain=gain, resolution=args.resolution, samples=args.samples, progress=bar, **settings,

@@ -131,8 +131,8 @@ def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums:
     """
     with failures():
         task.files.require(contents or {})
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
+        # the client has loaded the scene, and said them
+        with warnings.catch_warnings(action="ignore"):
             return _sums(task)
 
 

@@ -84,7 +84,6 @@ def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path, mo
     assert again.report.kept == there
     assert again.report.tasks == 12 - there
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
-    again.forget(0)
     assert not keep.exists()
 
 
