@@ -267,9 +267,9 @@ def run_survey(
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
     shown = tuple((surface or {}).items())
-    rows: dict[int, dict[str, Any]] = {}
-    jobs: dict[int, Job] = {}
     named: list[dict[str, str]] = []
+    rows: dict[int, dict[str, Any]] = {}  # those that are known, by their place in `named`
+    jobs: dict[int, Job] = {}
     for file in files:
         name = {"file": str(file), "sample": sample_of(file, repeats)}
         try:
@@ -277,7 +277,7 @@ def run_survey(
             job = Job(_files_of(file), treatment, theta, resolution, variant, threads, shown)
             parts = [job] if crops is None else _crops_of(job, file, crops)
         except DiffractionError as error:
-            rows[len(named)] = {"reason": str(error)}
+            rows[len(named)] = name | {"reason": str(error)}
             named.append(name)
             continue
         for part in parts:
@@ -285,7 +285,7 @@ def run_survey(
             if stored is None:
                 jobs[len(named)] = part
             else:
-                rows[len(named)] = stored
+                rows[len(named)] = name | stored
             named.append(name)
     todo = list(jobs)
     files_of_jobs = [Path(named[n]["file"]).name for n in todo]
@@ -294,17 +294,18 @@ def run_survey(
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):
-            rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
+            rows[n] = named[n] | {"reason": f"{result.text} {result.worker}".strip()}
         else:
-            rows[n] = _store(scans, Path(named[n]["file"]), jobs[n], result)
-        write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
+            rows[n] = named[n] | _store(scans, Path(named[n]["file"]), jobs[n], result)
+        # complete even if Ctrl-C ends the next scan
+        write_rows(folder / TABLE, [rows[n] for n in sorted(rows)])
         progress(done, len(todo), _next(files_of_jobs, done, client))
-    result = write_rows(folder / TABLE, named, rows)
-    write_repeats(folder / SAMPLES, result)
-    ranking = ranked(result)
-    write_rows(folder / TABLE, ranking, dict(enumerate(ranking)))
+    every = [rows[n] for n in sorted(rows)]
+    write_repeats(folder / SAMPLES, every)
+    ranking = ranked(every)
+    write_rows(folder / TABLE, ranking)
     write_sheets(folder, ranking)
-    return result
+    return every
 
 
 def _next(names: Sequence[str], done: int, client: Any) -> str:

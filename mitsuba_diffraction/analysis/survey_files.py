@@ -22,21 +22,12 @@ _NEEDED = ("width_um", "iridescence", "iridescence_by_chance", "iridescent_light
 _COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
 
 
-def write_rows(
-    path: Path,
-    named: Sequence[Mapping[str, str]],
-    rows_by_number: Mapping[int, Mapping[str, Any]],
-) -> list[dict[str, Any]]:
-    """Write the measured rows in the order of the files as CSV, and return them.
-
-    named : columns that name each file, the first of its row.
-    """
-    rows = [{**named[n], **rows_by_number[n]} for n in sorted(rows_by_number)]
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows as CSV; columns that name a file, and the reason, come first."""
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     first = ("file", "sample", "reason")
     names = [*first, *(name for name in columns if name not in first)]
     save_rows(path, names, rows)
-    return rows
 
 
 def is_row(row: object) -> TypeGuard[dict[str, Any]]:

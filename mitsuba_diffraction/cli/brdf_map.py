@@ -271,8 +271,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     from ..plugin.dictionary import bsdf_dict
     from ..plugin.presets import preset
 
-    parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
-    parameters |= surface_parameters(args)
+    parameters = options.table_options(args, tuple(_TABLE)) | surface_parameters(args)
     if (index := medium_index(args.ext_ior)) != 1.0:
         if args.preset is None and kind_of(args.source) in (FileKind.TABLE, FileKind.ORDERS):
             raise DiffractionError(

@@ -50,7 +50,7 @@ from . import (
 from .arguments import note_arguments
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
-from .report import STDOUT, check_outputs, save_report
+from .report import STDOUT, check_outputs, save_json
 from .spellings import current
 
 #: The sub-commands, in the order of --help.
@@ -153,11 +153,13 @@ def _run(args: argparse.Namespace) -> int:
     _load_matplotlib()
     try:
         note_arguments(args)
-        if args.json not in (None, STDOUT):
-            check_outputs([args.json])
+        report = [args.json] if args.json not in (None, STDOUT) else []
+        check_outputs(report)
         retired(args.retired)
         args.began, args.code = time.perf_counter(), DONE
-        save_report(args, args.run(args))
+        figures = args.run(args)
+        for file in report if figures else []:
+            save_json(file, figures)
         sys.stdout.flush()
         code: int = args.code
         return code

@@ -80,12 +80,6 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def save_report(args: argparse.Namespace, figures: Figures) -> None:
-    """Write the file of --json, if it is requested and there are figures."""
-    if figures and args.json not in (None, STDOUT):
-        save_json(args.json, figures)
-
-
 def elapsed(args: argparse.Namespace) -> float:
     """Return the seconds since the command began."""
     return time.perf_counter() - args.began
