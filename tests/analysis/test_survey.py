@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-import signal
-import time
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,6 @@ from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
-from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
 from tests.support.directions import rough_patch
 
@@ -218,24 +215,6 @@ def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
         rows = list(csv.DictReader(file))
     assert [Path(row["file"]).stem for row in rows] == ["straight"]
     assert said == ["straight.npy", "broken.npy"]
-
-
-def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, capfd):
-    def measure(job):
-        signal.raise_signal(signal.SIGINT)
-        time.sleep(60)
-
-    monkeypatch.setattr(module, "measure", measure)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    start = time.perf_counter()
-    try:
-        code = main(["survey", *map(str, scans), "--pixel-size", "0.1", "-o", str(tmp_path / "a")])
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert code == 130
-    assert time.perf_counter() - start < 30  # far from the minute that the scan would take
-    (line,) = capfd.readouterr().err.splitlines()
-    assert "run the command again to go on" in line
 
 
 def test_rows_are_ranked_by_light_beyond_chance_and_failed_ones_last():

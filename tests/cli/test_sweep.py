@@ -25,8 +25,7 @@ def test_choices_are_the_library_s():
 
 
 def test_a_sheet_and_its_numbers_are_written(run, heights, here):
-    ran = run("sweep", "wavelength-step", heights, *QUICK[:-2], "--values", "10", "50")
-    assert ran.code == 0, ran.err
+    ran = run("sweep", "wavelength-step", heights, *QUICK[:-2], "--values", "10", "50").succeeded()
     assert sorted(os.listdir(here)) == [f"grating-wavelength-step.{s}" for s in ("csv", "png")]
     assert "reference" in ran.out
     with open("grating-wavelength-step.csv", encoding="utf-8") as stream:
@@ -38,8 +37,7 @@ def test_a_sheet_and_its_numbers_are_written(run, heights, here):
 
 
 def test_a_sweep_over_methods_states_how_much_faster_the_default_is(run, heights, some_variant):
-    ran = run("sweep", "method", heights, *QUICK, "-o", "a.png")
-    assert ran.code == 0, ran.err
+    ran = run("sweep", "method", heights, *QUICK, "-o", "a.png").succeeded()
     for name in METHODS:
         assert f"\n  {name} " in ran.out
     assert "compiled" in ran.out
@@ -55,7 +53,8 @@ def test_a_sweep_over_methods_states_how_much_faster_the_default_is(run, heights
     ],
 )
 def test_every_method_makes_a_map(run, heights, here, method, options, said):
-    ran = run("brdf-map", heights, *QUICK[:-2], *options, "--method", method, "-o", "a.exr")
-    assert ran.code == 0, ran.err
+    ran = run(
+        "brdf-map", heights, *QUICK[:-2], *options, "--method", method, "-o", "a.exr"
+    ).succeeded()
     assert said in ran.out
     assert sorted(os.listdir(here)) == ["a.exr", "a.png"]

@@ -91,8 +91,7 @@ def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_p
         "precompute", "scan.npy", "--pixel-size", PIXEL, "--coherence-width", 6, "--tolerance",
         0.02, "--wavelength-range", "500:600", "--workers", 1,
         "--json", "out.json",
-    )  # fmt: skip
-    assert ran.code == 0, ran
+    ).succeeded()  # fmt: skip
     assert "tasks of windows" in ran.out
     assert DiffractionTable.load("scan.exr").digest() == alone.digest()
     assert json.loads((tmp_path / "out.json").read_text())["workers"]["tasks"] > 10

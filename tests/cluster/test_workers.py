@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -18,7 +16,7 @@ distributed = pytest.importorskip("distributed")
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import workers  # noqa: E402
 from tests.cluster.clusters import VARIANT, Recorder, film, rendered  # noqa: E402
-from tests.support import ROOT  # noqa: E402
+from tests.support.machine import python  # noqa: E402
 
 
 @pytest.mark.parametrize("number", range(3))
@@ -37,10 +35,7 @@ def test_a_process_without_llvm_says_so_as_a_worker():
         "from mitsuba_diffraction.cluster.workers import trouble_of_process, versions\n"
         f"print(trouble_of_process(versions(), {VARIANT!r}))"
     )
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), "DRJIT_LIBLLVM_PATH": "/none/libLLVM.so"}
-    ran = subprocess.run(
-        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
-    )
+    ran = python(code, DRJIT_LIBLLVM_PATH="/none/libLLVM.so")
     assert ran.stdout.startswith('DRJIT_LIBLLVM_PATH="/none/libLLVM.so": there is no such file')
 
 
