@@ -274,7 +274,9 @@ def run_survey(
         name = {"file": str(file), "sample": sample_of(file, repeats)}
         try:
             treatment = treatment_for(file, treatments).updated(common or Treatment())
-            job = Job(_files_of(file), treatment, theta, resolution, variant, threads, shown)
+            of_scan = SceneFiles.from_scene(readable_file(file), {})
+            Source.of(file)  # a recipe is checked
+            job = Job(of_scan, treatment, theta, resolution, variant, threads, shown)
             parts = [job] if crops is None else _crops_of(job, file, crops)
         except DiffractionError as error:
             rows[len(named)] = name | {"reason": str(error)}
@@ -331,13 +333,6 @@ def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         return bool(row["reason"]), narrow, -(row.get("iridescent_light") or 0.0)
 
     return sorted(rows, key=place)
-
-
-def _files_of(file: Path) -> SceneFiles:
-    """Return the scan's files, after a check of the recipe if it is one."""
-    files = SceneFiles.from_scene(readable_file(file), {})
-    Source.of(file)
-    return files
 
 
 def _crops_of(job: Job, file: Path, count: int) -> list[Job]:

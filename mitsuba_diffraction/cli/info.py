@@ -183,6 +183,7 @@ def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[st
 def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
+    from ..gltf import materials_of
     from ..scene.fitted_mesh import fit_of
     from ..scene.orientation.mesh_files import read_mesh
     from ..scene.orientation.tangents import check_tangents
@@ -192,7 +193,9 @@ def _mesh(file: Path) -> dict[str, Any]:
     with mitsuba_warnings():
         read = read_mesh(file)
         mesh, report = read.mesh, check_tangents(*read.mesh, read.orientation)
-    summary = report.summary()
+    materials = {}
+    if file.suffix.lower() in GLTF:  # names that --preset and --assign take
+        materials["materials"] = [each.name for each in materials_of(file)] or ["none"]
     try:
         fit: Any = fit_of(mesh.positions, file).summary()
     except DiffractionError as error:
@@ -201,15 +204,8 @@ def _mesh(file: Path) -> dict[str, Any]:
     return {
         "kind": "mesh",
         "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
-        **summary,
-        **({"materials": _materials(file)} if file.suffix.lower() in GLTF else {}),
+        **report.summary(),
+        **materials,
         "normals": "in the file" if read.own_normals else _SMOOTH,
         "fit of render MESH --patch FILE": fit,
     }
-
-
-def _materials(file: Path) -> list[str]:
-    """Return the names of a glTF file's materials, which --preset and --assign take."""
-    from ..gltf import materials_of
-
-    return [material.name for material in materials_of(file)] or ["none"]

@@ -260,7 +260,12 @@ def _run_frames(args: argparse.Namespace) -> Figures:
             if on_workers(args):
                 done, workers = _frames_on_workers(args, to_do, folder, variant)
             else:
-                done = _frames_here(args, to_do, variant)
+                with Bar(args, unit=" spp", delay=0) as bar:
+                    bar(0, 0, "loading")
+                    here = render_frames(
+                        args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
+                    )
+                    done = sum(1 for _ in here)
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
               "interrupted": done < len(to_do), "seconds": elapsed(args),
@@ -280,16 +285,6 @@ def _run_frames(args: argparse.Namespace) -> Figures:
         write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
     return report | {"film": film}
-
-
-def _frames_here(args: argparse.Namespace, to_do: Sequence[Frame], variant: str) -> int:
-    """Render frames in this process; return how many were finished."""
-    with Bar(args, unit=" spp", delay=0) as bar:
-        bar(0, 0, "loading")
-        frames = render_frames(
-            args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
-        )  # fmt: skip
-        return sum(1 for _ in frames)
 
 
 def _frames_on_workers(

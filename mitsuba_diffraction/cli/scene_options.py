@@ -56,11 +56,15 @@ SCENE = (
 def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
     """Return the values of -D, --assign and --preset, as `load_scene` takes them.
 
-    A mesh in place of a scene is put into the studio, with its surface, by `put_on_stage`.
+    What is given twice is a usage error. A mesh in place of a scene is put into the studio, with
+    its surface, by `put_on_stage`.
     """
     from ..scene.surfaces import MATERIAL, PRESET
 
-    parameters = _definitions(args)
+    parameters = dict(args.parameters)
+    if len(parameters) < len(args.parameters):
+        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
+        args.parser.error(f"argument -D: {twice!r} is set more than once")
     surfaces = list(args.materials)
     for text in args.presets:
         head, comma, changes = text.partition(",")
@@ -135,12 +139,3 @@ def _change_looks(args: argparse.Namespace) -> None:
     args.parameters = [pair for pair in args.parameters if pair[0] not in NAMES[REFLECTING]]
     args.presets = [preset + changes for preset in args.presets]
     args.materials = [(name, file + changes) for name, file in args.materials]
-
-
-def _definitions(args: argparse.Namespace) -> dict[str, str]:
-    """Return the values of -D; a parameter given twice is a usage error."""
-    parameters = dict(args.parameters)
-    if len(parameters) < len(args.parameters):
-        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
-        args.parser.error(f"argument -D: {twice!r} is set more than once")
-    return parameters

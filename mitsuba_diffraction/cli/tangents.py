@@ -64,7 +64,13 @@ def run(args: argparse.Namespace) -> Figures:
         'value="vertex_orientation"/></texture> within the diffraction BSDF'
     )
     if report.breaks:
-        say_warning(f"the field {report.breaking()}: {_todo(args.along, report)}")
+        others = " or ".join(guide for guide in ("smooth", "body") if guide != args.along)
+        # triangles may be too large for the field's rotation
+        finer = "use a finer mesh, or " if report.turns_fast else ""
+        say_warning(
+            f"the field {report.breaking()}: colours will show seams there; {finer}choose another "
+            f"guide, --along {others}"
+        )
     elif report.turns_fast:
         say_warning(
             f"the field turns by over {BREAK:g} degrees within triangles on {report.turning:.0%} "
@@ -73,15 +79,6 @@ def run(args: argparse.Namespace) -> Figures:
     places = [{"at": at, "turns": n} for at, n in zip(field.singular, field.indices, strict=True)]
     return {"mesh": args.mesh, "files": [args.output], "along": args.along,
             "singular": places, "tangents": report}  # fmt: skip
-
-
-def _todo(along: str, report: TangentReport) -> str:
-    """Return the remedy for a field that breaks."""
-    others = " or ".join(guide for guide in ("smooth", "body") if guide != along)
-    todo = f"choose another guide, --along {others}"
-    if report.turns_fast:  # triangles are too large for the field's rotation
-        todo = f"use a finer mesh, or {todo}"
-    return f"colours will show seams there; {todo}"
 
 
 def _places(places: object, indices: object, report: TangentReport) -> str:

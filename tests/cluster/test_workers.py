@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
-from pathlib import Path
 
+import psutil
 import pytest
 
 pytestmark = pytest.mark.thorough
@@ -86,21 +85,12 @@ def test_workers_with_too_little_memory_are_named(scene, tmp_path):
 def test_pages_of_workers_are_for_this_machine_alone(client):
     for address in (client.scheduler_info()["address"], client.dashboard_link):
         assert "//127.0.0.1:" in address
-    assert _listening(os.getpid()) <= {"0100007F"}  # in hexadecimal: 127.0.0.1
+    assert _listening(os.getpid()) <= {"127.0.0.1"}
     for worker in client.cluster.workers.values():
-        assert _listening(worker.pid) <= {"0100007F"}
+        assert _listening(worker.pid) <= {"127.0.0.1"}
 
 
 def _listening(process: int) -> set[str]:
-    """Addresses of IPv4 and IPv6 at which a process listens, as /proc has them."""
-    sockets = set()
-    for link in Path(f"/proc/{process}/fd").iterdir():
-        with contextlib.suppress(OSError):
-            sockets.add(os.readlink(link))
-    found = set()
-    for table in ("tcp", "tcp6"):
-        for line in Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]:
-            fields = line.split()
-            if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
-                found.add(fields[1].partition(":")[0])
-    return found
+    """Addresses of IPv4 and IPv6 at which a process listens."""
+    every = psutil.net_connections("inet")
+    return {c.laddr.ip for c in every if c.pid == process and c.status == psutil.CONN_LISTEN}
