@@ -81,10 +81,10 @@ def run(args: argparse.Namespace) -> Figures:
     """Measure, fit, draw, and return the figures."""
     files = beside(".csv", ".npz")
     written = files(output_of(args, Path(f"{args.source.stem}-evaluation.png"), files))
-    from ..thesis.period_fit.plot import figure, save_csv, save_npz
-
     experiment = _prepared(args)
     response, ridge, fit, lines, figures = _measured(args, experiment)
+    from ..thesis.period_fit.plot import figure, save_csv, save_npz
+
     report = [("spectrum", str(grating)) for grating in experiment.gratings] + lines
     period = figures["fitted_period"] if args.period is None else args.period
     picture = figure(

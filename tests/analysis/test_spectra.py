@@ -150,12 +150,6 @@ def test_a_wide_cone_collects_a_mirror_s_narrow_lobe_wherever_it_lies():
     assert light.value[0] == pytest.approx(0.04, rel=2e-3)
 
 
-def test_a_mirror_is_all_of_a_mirror():
-    metal = load(FLAT, coherence_width=10.0, material="none", energy_conserving=False)
-    light = md.spectrum(metal, 50.0, [50.0], relative="mirror", wavelengths=LAM)
-    assert light.value == pytest.approx(1.0, rel=1e-4)  # single precision
-
-
 def test_wavelengths_beyond_a_metal_s_table_are_refused():
     metal = load(FLAT, coherence_width=10.0, material="Al")
     with pytest.raises(md.DiffractionError, match=r"298\.8 to 885\.6"):

@@ -182,25 +182,6 @@ def test_samples_have_means_and_standard_errors(tmp_path):
         assert [row["sample"] for row in csv.DictReader(file)] == ["a", "b"]
 
 
-def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path):
-    # a window of 20 µm sees one part of a scale, whose index is 0.085 to 0.111: a mean of two
-    scale = gratings.elaphe_like(20.0, 160).heights
-    patches = [np.zeros((160, 160)), gratings.cd(20.0, 160).heights]
-    patches += [np.roll(scale, (n, n), (0, 1)) for n in (0, 80)]
-    files = [tmp_path / f"{n}.npy" for n in range(len(patches))]
-    for file, heights in zip(files, patches, strict=True):
-        np.save(file, heights)
-    options = load_treatments(_toml(tmp_path, '["*.npy"]\npixel_size = 0.125\n'))
-    rows = run_survey(
-        files, tmp_path / "out", treatments=options,
-        common=Treatment(settings={"coherence_width": 20.0, "tolerance": 0.05}), resolution=32,
-    )  # fmt: skip
-    assert [row["reason"] for row in rows] == [""] * 4
-    mirror, disc, *scales = (row["iridescence"] for row in rows)
-    assert mirror == 0.0
-    assert 0.02 < np.mean(scales) < disc
-
-
 def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
     said = []
 
