@@ -200,7 +200,7 @@ def add_option(
 ) -> None:  # fmt: skip
     """Add an option, or an argument.
 
-    usage : names of the option and of its values, such as "-s --spp N"; "..." if they are many.
+    usage : names of the option and of its value, such as "-s --spp N"; "..." if there may be many.
     text : help; the default value is told at its end, unless the text tells a default.
     kind : type of a value; a tuple of choices; bool of a flag; or, of an option that may be given
         several times, a list of the type.
@@ -212,12 +212,10 @@ def add_option(
     how: dict[str, Any] = {"help": text}
     if not names:
         how["dest"] = values[0].lower()
-    if values[1:] == ["..."]:
-        how |= {"nargs": "+", "metavar": values[0]}
-    elif len(values) > 1:
-        how |= {"nargs": len(values), "metavar": tuple(values)}
-    elif values:
+    if values:
         how["metavar"] = values[0]
+    if values[1:] == ["..."]:
+        how["nargs"] = "+"
     if kind is bool:
         how["action"] = "store_true"
     elif isinstance(kind, list):
