@@ -165,25 +165,29 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     from ..orders.solve.recipes import SolvedRecipe, profile_of
     from ..orders.solve.settings import Settings
 
-    source = Path(args.source)
+    source, output = Path(args.source), Path(f"{Path(args.source).stem}.nc")
+    shape = options.given(args, ("period", "depth", "duty", "direction"))
     if args.crossed:
         options.refuse(args, ("duty", "direction"), ": not allowed with --crossed")
-        cell, output = _unit_cell(source, args), args.output or Path(f"{source.stem}.nc")
-        recipe = SolvedRecipe(cell, "1.5", 1.0, False, Settings(), Path(output))
-        return _changed(recipe, args)
-    options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
-    shape = options.given(args, ("period", "depth", "duty", "direction"))
-    if source.suffix.lower() == ".toml":
-        options.refuse(args, shape, ": the recipe has the profile")
-        recipe = SolvedRecipe.load(source)
+        recipe = SolvedRecipe(_unit_cell(source, args), "1.5", 1.0, False, Settings(), output)
     else:
+        options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
         if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
             args.parser.error(
                 f"argument SOURCE: '{source}' holds no profile; for efficiencies add --import"
             )
-        profile = profile_of(args.source, shape)
-        recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), Path(f"{source.stem}.nc"))
-    return _changed(recipe, args)
+        if source.suffix.lower() == ".toml":
+            options.refuse(args, shape, ": the recipe has the profile")
+            recipe = SolvedRecipe.load(source)
+        else:
+            profile = profile_of(args.source, shape)
+            recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), output)
+    changed = options.given(args, _OF_A_RECIPE)
+    for name in ("layers", "beneath"):
+        if name in changed:
+            changed[name] = tuple(itertools.chain(*changed[name]))
+    settings = {_SETTINGS[name]: v for name, v in options.given(args, _SETTINGS).items()}
+    return replace(recipe, settings=replace(recipe.settings, **settings), **changed)
 
 
 def _unit_cell(source: Path, args: argparse.Namespace) -> HeightField:
@@ -200,16 +204,6 @@ def _unit_cell(source: Path, args: argparse.Namespace) -> HeightField:
     rows, columns = cell.heights.shape
     sizes = args.period / columns, (args.period_y or args.period) / rows
     return replace(cell, pixel_size=sizes)
-
-
-def _changed(recipe: SolvedRecipe, args: argparse.Namespace) -> SolvedRecipe:
-    """Return a recipe with the options that override it."""
-    changed = options.given(args, _OF_A_RECIPE)
-    for name in ("layers", "beneath"):
-        if name in changed:
-            changed[name] = tuple(itertools.chain(*changed[name]))
-    settings = {_SETTINGS[name]: v for name, v in options.given(args, _SETTINGS).items()}
-    return replace(recipe, settings=replace(recipe.settings, **settings), **changed)
 
 
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
