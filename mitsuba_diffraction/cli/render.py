@@ -36,15 +36,7 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED, keep_in_mind
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
-from .report import (
-    Figures,
-    check_outputs,
-    default_output,
-    elapsed,
-    exr_and_png,
-    output_name,
-    output_of,
-)
+from .report import Figures, check_outputs, elapsed, exr_and_png, output_name, output_of
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
 
@@ -113,8 +105,7 @@ def _output(args: argparse.Namespace) -> Path:
         args.parser.error(
             f"argument -o: expected a name ending in .exr or .png, got {str(args.output)!r}"
         )
-    default = Path(default_output(args.name, ".exr").name)
-    return output_of(args, default, partial(_files, args))
+    return output_of(args, Path(f"{args.name.stem}.exr"), partial(_files, args))
 
 
 def _files(args: argparse.Namespace, output: Path) -> list[Path]:

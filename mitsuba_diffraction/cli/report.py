@@ -162,16 +162,6 @@ def _check_folder(path: Path, make_folder: bool) -> None:
         ) from error
 
 
-def default_output(source: Path, suffix: str) -> Path:
-    """Return the name of an output that is called after its source.
-
-    Raises a DiffractionError if the source is a folder without a name, such as "." or "/".
-    """
-    if not source.name:
-        raise DiffractionError(f"'{source}' is a folder; name a file in it")
-    return source.with_suffix(suffix)
-
-
 def output_name(
     given: Path | None, default: Path, files: Callable[[Path], Iterable[Path]] = lambda path: [path]
 ) -> Path:
