@@ -18,7 +18,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import numpy as np
+from PIL import Image
 
 from ..atomic import atomic_path
 from ..cluster.jobs import run_jobs
@@ -28,7 +30,9 @@ from ..files import readable_file
 from ..heights import Source
 from ..heights.coherence import REPEATS, widest_window
 from ..heights.spectra import examine_periods
+from ..plugin.dictionary import bsdf_dict
 from ..progress import Progress, silent
+from ..scene import set_variant
 from ..tables import DiffractionTable, TableSource
 from ..tables.store import key_of
 from .crops import crops_of
@@ -106,11 +110,6 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
 
 def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     """Fill the row of a scan, so far as no error ends it, and return table and map."""
-    import drjit as dr
-
-    from ..plugin.dictionary import bsdf_dict
-    from ..scene import set_variant
-
     set_variant(job.variant)
     if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
         dr.set_thread_count(job.threads)
@@ -183,9 +182,6 @@ def _material(job: Job, table: DiffractionTable) -> MaterialFactor:
 
     Mitsuba takes seconds to change the variant: it loads its integrators again.
     """
-    from ..plugin.dictionary import bsdf_dict
-    from ..scene import set_variant
-
     key = job.surface, job.theta, job.variant
     if key not in _materials:
         set_variant(job.variant.replace("rgb", "spectral"))  # wavelengths, not colours
@@ -206,8 +202,6 @@ def _exr(table: DiffractionTable) -> bytes:
 
 def _png(brdf_map: BrdfMap) -> bytes:
     """Encode the map as a PNG, the largest y first."""
-    from PIL import Image
-
     stream = io.BytesIO()
     pixels = np.round(255.0 * brdf_map.srgb(brdf_map.exposure())[::-1]).astype(np.uint8)
     Image.fromarray(pixels, "RGBA").save(stream, "PNG")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard
 
 from ..columns import save_rows
-from ..images import save_figure
+from ..images import open_image, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,8 +47,6 @@ def is_row(row: object) -> TypeGuard[dict[str, Any]]:
 
 def is_map(file: Path) -> bool:
     """Say whether a file is a picture that a contact sheet can show."""
-    from ..images import open_image
-
     try:
         with open_image(file, ("PNG",)) as picture:
             picture.load()
@@ -77,8 +75,6 @@ def _iridescence(row: Mapping[str, Any]) -> str:
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
     from matplotlib.figure import Figure
-
-    from ..images import open_image
 
     lines = math.ceil(len(rows) / _COLUMNS)
     figure = Figure(figsize=(2.2 * _COLUMNS, 2.7 * lines), dpi=100)

@@ -13,6 +13,7 @@ from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
+from ..plugin.description import Surface
 from ..scene import set_variant
 from ..settings import TableSettings
 from . import options
@@ -294,8 +295,6 @@ def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:
 
 def _surface(bsdf: Any) -> str:
     """Describe the reflecting surface in a line."""
-    from ..plugin.description import Surface
-
     described: Surface = bsdf.describe()
     turn, scale = described.orientation.number, described.height_scale.number
     turned = [f"turned by {turn:g}°"] if turn != 0.0 else []

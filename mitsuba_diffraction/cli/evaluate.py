@@ -11,9 +11,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ..errors import DiffractionError, DiffractionWarning, counted
+from ..heights import HeightField, dominant_periods
+from ..heights.coherence import resolved_width
+from ..heights.spectra import Periodicity
 from ..images import save_figure
+from ..scene import set_variant
 from ..settings import TableSettings
+from ..tables import TableSource
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
@@ -21,9 +28,6 @@ from .options import whole_number
 from .report import Figures, beside, elapsed, output_of
 
 if TYPE_CHECKING:
-    from ..heights import HeightField
-    from ..heights.spectra import Periodicity
-    from ..tables import TableSource
     from ..thesis.period_fit import Beam, Fit, Response, Ridge
 
 # Single windows are fitted at about so many wavelengths: the period needs no more.
@@ -124,8 +128,6 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
             f"method={args.method} reflects all light; leave the material out, or the method"
         )
     from ..analysis.media import in_medium, medium_index
-    from ..heights import dominant_periods
-    from ..tables import TableSource
     from ..thesis.methods.method import trapezoid_rule
     from ..thesis.methods.periods import check_period
     from ..thesis.period_fit import Beam
@@ -161,7 +163,6 @@ def _measured(
     Returns the response, its ridge of maxima, the fit of the period, lines to print, each with its
     label, and entries of the NPZ file. The ridge is empty and the fit None if no period fits.
     """
-    from ..heights.coherence import resolved_width
     from ..thesis.period_fit import measure
 
     patch, _, settings, _, held, beam, steps, angles = experiment
@@ -196,7 +197,6 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     from ..analysis.scans import bsdf_of, check_surface, table_of
     from ..analysis.spectra import brdf_values, table_range
     from ..plugin.dictionary import bsdf_dict
-    from ..scene import set_variant
 
     steps = experiment.steps
     check_material(args.material, steps, args.pigment)
@@ -211,8 +211,6 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
 
 def _distance(args: argparse.Namespace, ridge: Ridge) -> str:
     """Describe how far the ridge is from the period that is given; "" without either."""
-    import numpy as np
-
     if args.period is None:
         return ""
     apart = np.abs(ridge.angles - ridge.grating_angles(args.period))
@@ -235,8 +233,6 @@ def _followed(
 
     Raises a DiffractionError if there are too few maxima to look for one.
     """
-    import numpy as np
-
     from ..thesis.period_fit import FEWEST, Ridge, find_period, fit_period, ridge_of
 
     period = find_period(response, held, order)
@@ -264,8 +260,6 @@ def viewing_angles(
 
     Raises a DiffractionError if the range is empty or the step does not fit it.
     """
-    import numpy as np
-
     sign = 1 if order > 0 else -1
     end = 80.0
     if reach is not None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError, counted
+from ..scene import set_variant
 from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings
@@ -56,8 +57,6 @@ def run(args: argparse.Namespace) -> Figures:
     name = args.format or next(name for name, known in _SUFFIXES.items() if suffix in known)
     if suffix not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
-
-    from ..scene import set_variant
 
     set_variant(args.mode)
     from ..analysis.export import rgl, scatter, zemax

@@ -5,19 +5,24 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import mitsuba as mi
 
 from ..errors import DiffractionError
 from ..files import GLTF, MESHES, FileKind
+from ..gltf import materials_of
+from ..heights import HeightField, Recipe, Source, jumping_lines
+from ..heights.coherence import resolved, width_reason
+from ..heights.formats.catalogue import sections
+from ..heights.spectra import LEAST_SHARE, examine_periods
 from ..images import save_figure
 from ..settings import TableSettings
+from ..tables import DiffractionTable
 from . import options
 from .console import Bar, mitsuba_warnings
 from .options import path_ending_in
 from .report import STDOUT, Figures, lines_of, plain
-
-if TYPE_CHECKING:
-    from ..heights import HeightField, Recipe, Source
 
 # What `render MESH` and `tangents` do with a mesh without normals
 _SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV edges stay"
@@ -52,8 +57,6 @@ def run(args: argparse.Namespace) -> Figures:
         return _formats(args)
     if args.file is None:
         args.parser.error("name a file, or give --formats")
-    from ..heights import Source
-
     source = Source.of(args.file, options.load_options(args))
     others = FileKind.TABLE, FileKind.ORDERS, FileKind.MESH, FileKind.SCENE
     if source.kind not in others:
@@ -71,7 +74,6 @@ def run(args: argparse.Namespace) -> Figures:
     if args.energy or args.albedo is not None:
         from ..analysis.energy import energy_summary, energy_warnings, sides_summary
         from ..analysis.pictures import albedo_figure
-        from ..tables import DiffractionTable
 
         table = DiffractionTable.load(args.file)
     if args.energy:
@@ -95,8 +97,6 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _formats(args: argparse.Namespace) -> Figures:
     """Print the formats of scans, and return the figures."""
-    from ..heights.formats.catalogue import sections
-
     data = sections()
     if args.json == STDOUT:
         print(json.dumps(data, indent=2, ensure_ascii=False))
@@ -127,16 +127,12 @@ def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     if kind is FileKind.MESH:
         return _mesh(file)
     from ..orders.file import load_orders
-    from ..tables import DiffractionTable
 
     load: Any = DiffractionTable.load if kind is FileKind.TABLE else load_orders
     return {"kind": str(kind), **load(file).summary()}
 
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights import jumping_lines
-    from ..heights.coherence import resolved, width_reason
-
     field = source.field()
     settings = TableSettings(**options.table_options(args))
     warnings = options.table_warnings([field], settings)
@@ -153,8 +149,6 @@ def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
 
 def _periods(field: HeightField) -> dict[str, Any]:
     """Return the gratings of the patch, and a structure that is too weak for one, if any."""
-    from ..heights.spectra import LEAST_SHARE, examine_periods
-
     gratings, weak = examine_periods(field)
     described: dict[str, Any] = {"periods": [str(grating) for grating in gratings] or ["none"]}
     if weak is not None:
@@ -163,8 +157,6 @@ def _periods(field: HeightField) -> dict[str, Any]:
 
 
 def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.coherence import resolved, width_reason
-
     fields = source.fields()
     settings = TableSettings(**{**source.settings, **options.table_options(args)})
     return {
@@ -181,9 +173,6 @@ def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[st
 
 
 def _mesh(file: Path) -> dict[str, Any]:
-    import mitsuba as mi
-
-    from ..gltf import materials_of
     from ..scene.fitted_mesh import fit_of
     from ..scene.orientation.mesh_files import read_mesh
     from ..scene.orientation.tangents import check_tangents

@@ -12,7 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, counted
 from ..files import FileKind
+from ..heights import dominant_periods, stands_in_full
+from ..heights.coherence import blur
+from ..heights.source import notes_line
 from ..settings import TableSettings
+from ..tables import DiffractionTable, TableSource
+from ..tables.source import loaded_table
 from . import options
 from .brdf_map import surface_parameters
 from .console import Bar, say
@@ -21,7 +26,6 @@ if TYPE_CHECKING:
     from ..analysis.spectra import Spectra
     from ..analysis.spectrometer import MeasurementGeometry
     from ..analysis.treatments import Treatment
-    from ..tables.source import TableSource
 
 
 @dataclass
@@ -48,8 +52,6 @@ class Measurement:
         """
         from ..analysis.treatments import Treatment, load_treatments, treatment_for
         from ..orders.file import load_orders
-        from ..tables import TableSource
-        from ..tables.source import loaded_table
 
         found = treatment_for(file, load_treatments(self.args.treatments))
         treatment = found.updated(Treatment(options.load_options(self.args)))
@@ -73,8 +75,6 @@ class Measurement:
 
     def _of_table(self, table: Any, file: Path) -> Spectra:
         """Measure the spectra of a table."""
-        from ..tables import DiffractionTable
-
         args = self.args
         own = (*options.HEIGHTS, *options.TABLE, "crops", "ext_ior")
         if refused := options.given(args, own):
@@ -115,9 +115,6 @@ class Measurement:
         from ..analysis.media import in_medium, medium_index, optical_scale
         from ..analysis.scans import table_of
         from ..analysis.spectra import table_range
-        from ..heights import dominant_periods
-        from ..heights.coherence import blur
-        from ..heights.source import notes_line
 
         args, geometry, first = self.args, self.geometry, float(self.lam[0])
         asked = {**treatment.settings, **options.table_options(args, options.TABLE)}
@@ -162,8 +159,6 @@ class Measurement:
 
     def _say_first(self, line: str) -> None:
         """Print the notes on the first scan that has any, and warnings; count the others."""
-        from ..heights import stands_in_full
-
         self._noted += 1
         if self._noted == 1 or stands_in_full(line):
             say(line)

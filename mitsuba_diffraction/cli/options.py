@@ -1,8 +1,7 @@
 """Commands, declared by `command`; options that several share, and types of arguments.
 
 A value that does not fit is a usage error that quotes it. Options are rows of values; the functions
-beside them read what is given. Modules of the library are imported where values are read, so that
---help answers at once.
+beside them read what is given.
 """
 
 from __future__ import annotations
@@ -12,17 +11,17 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import DiffractionError, quoted
-from ..heights import LoadOptions
+from ..heights import HeightField, LoadOptions, Source, units_warning
+from ..heights.coherence import resolved
 from ..heights.read import OPTIONS
+from ..heights.source import notes_line
 from ..optics.display import VIEWS
 from ..settings import SETTINGS, TableSettings, checked
+from ..tables.build.checks import check_units, check_window, period_of, warnings_of
 from .report import Figures
-
-if TYPE_CHECKING:
-    from ..heights import HeightField
 
 #: The values that `add_option` takes after the group.
 Row = tuple[Any, ...]
@@ -361,8 +360,6 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
     Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
-    from ..heights import Source
-
     source = Source.of(args.source, load_options(args))
     settings = {**source.settings, **table_options(args)}
     return source.field(), {name: settings[name] for name in TABLE_NAMES if name in settings}
@@ -370,10 +367,6 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, and its refusal if size alone decides."""
-    from ..heights import units_warning
-    from ..heights.coherence import resolved
-    from ..tables.build.checks import check_units, check_window, period_of, warnings_of
-
     how = resolved(settings, fields)
     try:
         check_units(fields)
@@ -389,7 +382,5 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:
     """Return a line on the number of notes on heights and the command that prints them, or ""."""
-    from ..heights.source import notes_line
-
     lines = table_warnings([field], settings)
     return notes_line(lines, args.source, load_options(args), settings)

@@ -12,6 +12,7 @@ from pathlib import Path
 from ..errors import DiffractionError, quoted
 from ..files import MESHES, OTHER_MESHES, FileKind, kind_of, readable_file
 from ..scene.parameters import Change, change_of
+from ..scene.stage import STUDIO
 from .options import MODE, whole_number
 
 #: Id of the BSDF of a scene's patch: of the studio, the material ball, plate, sphere and scales.
@@ -87,8 +88,6 @@ def put_on_stage(args: argparse.Namespace) -> None:
 
     The scene is then the studio, and default names of outputs follow the mesh: `args.name`.
     """
-    from ..scene.stage import STUDIO
-
     args.name, suffix = args.scene, args.scene.suffix.lower()
     if suffix in OTHER_MESHES:
         raise DiffractionError(

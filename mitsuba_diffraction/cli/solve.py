@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, counted
+from ..heights import HeightField, LoadOptions
+from ..heights.read import read_heights
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -17,7 +19,6 @@ from .report import Figures, check_outputs, output_name
 from .workers import WORKERS, executor_for
 
 if TYPE_CHECKING:
-    from ..heights import HeightField
     from ..orders import OrderTable
     from ..orders.solve.films import Layers
     from ..orders.solve.recipes import SolvedRecipe
@@ -192,9 +193,6 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
 
 def _unit_cell(source: Path, args: argparse.Namespace) -> HeightField:
     """Read one period of heights in x and y."""
-    from ..heights import LoadOptions
-    from ..heights.read import read_heights
-
     if args.period is None:
         args.parser.error("argument --crossed: needs --period, µm")
     cell = read_heights(

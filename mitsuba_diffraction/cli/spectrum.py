@@ -9,6 +9,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..errors import DiffractionError, counted
 from ..images import save_figure
 from ..scene.load import set_variant
@@ -279,8 +281,6 @@ def _title(groups: dict[str, list[Path]], args: argparse.Namespace) -> str:
 
 def _wavelengths(args: argparse.Namespace) -> Any:
     """Return the wavelengths (n,) that are asked for, nm."""
-    import numpy as np
-
     first, last = args.wavelength_range or _RANGE
     if not 100.0 <= first <= last <= 10000.0:
         args.parser.error(

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, counted
+from ..heights.coherence import ONE_WINDOW
 from ..scene.load import set_variant
+from ..scene.parameters import files_of
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
@@ -57,7 +59,6 @@ def run(args: argparse.Namespace) -> Figures:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
     failed = sum(bool(row["reason"]) for row in rows)
     from ..analysis.iridescence import WINDOW
-    from ..heights.coherence import ONE_WINDOW
 
     wide = sorted(row["width_um"] for row in rows if not row["reason"])
     if wide and wide[-1] > _SIZES * max(wide[0], WINDOW):
@@ -91,8 +92,6 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _read_by(scans: Sequence[Path]) -> Iterator[Path]:
     """Yield the scans with the files that their recipes name; survey.csv tells of wrong recipes."""
-    from ..scene.parameters import files_of
-
     for scan in scans:
         with contextlib.suppress(DiffractionError):
             yield from files_of(scan)

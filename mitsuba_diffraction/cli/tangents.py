@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import counted
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
@@ -83,8 +85,6 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _places(places: object, indices: object, report: TangentReport) -> str:
     """Name the singular points in one line, or say that the field has none."""
-    import numpy as np
-
     points, turns = np.asarray(places), np.asarray(indices)
     if not len(points):
         if report.broken > 0:

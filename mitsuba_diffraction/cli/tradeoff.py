@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionWarning
+from ..heights import Source, gratings
+from ..heights.coherence import resolved_width
 from ..scene import set_variant
+from ..tables import DiffractionTable
 from . import options
 from .console import Bar
 from .options import number_between
@@ -57,8 +60,6 @@ def run(args: argparse.Namespace) -> Figures:
     )
     from ..analysis.tradeoff.accuracy import Sample
     from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
-    from ..heights import Source, gratings
-    from ..heights.coherence import resolved_width
 
     side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
     if args.heights is None:
@@ -82,8 +83,6 @@ def run(args: argparse.Namespace) -> Figures:
         if budget == Budget():
             budget = Budget(1e-3)
         best = recommended(results, budget)
-        from ..tables import DiffractionTable
-
         finest = DiffractionTable.build(field, coherence_width=width, tolerance=1e-4)
         sample = Sample.draw(field, width, "ensemble", min(pairs, 160), bar)
         spectral = measure_wavelengths(finest, sample.wi, sample.wo)

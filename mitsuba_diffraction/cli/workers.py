@@ -7,6 +7,7 @@ import contextlib
 import importlib.util
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,8 +17,6 @@ from .console import Bar, say, say_warning
 from .options import Group, refuse, whole_number
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     from ..cluster import FrameRequest, FrameSequence
 
 #: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.

@@ -20,6 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
@@ -159,8 +160,6 @@ def failures() -> Iterator[None]:
 
 
 def _sums(task: Task) -> Sums:
-    import drjit as dr
-
     start = time.perf_counter()
     check_versions(task.versions)
     threads = task.threads or cores()
