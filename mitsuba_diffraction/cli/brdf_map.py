@@ -8,14 +8,29 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from ..analysis.maps import (
+    Bands,
+    LightDirection,
+    brdf_map,
+    check_map,
+    check_variant,
+    save_exr,
+    save_png,
+)
+from ..analysis.media import medium_index
+from ..analysis.scans import bsdf_of, check_surface
 from ..errors import DiffractionError, DiffractionWarning, counted
 from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
 from ..plugin.description import Surface
+from ..plugin.dictionary import bsdf_dict
+from ..plugin.pigment import pigment_range
+from ..plugin.presets import find_preset, preset
 from ..scene import set_variant
 from ..settings import TableSettings
+from ..thesis.methods import Gain, make, method_map
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
@@ -90,13 +105,9 @@ def take_source(args: argparse.Namespace) -> None:
     if (args.source is None) == (args.preset is None):
         args.parser.error("name either SOURCE or --preset NAME")
     if args.preset is not None:
-        from ..plugin.presets import find_preset
-
         args.source = find_preset(args.preset).patch
     surface_parameters(args)
     if args.pigment is not None:
-        from ..plugin.pigment import pigment_range
-
         pigment_range(args.pigment)
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
@@ -106,8 +117,6 @@ def gain_of(args: argparse.Namespace) -> Any:
 
     Raises a DiffractionError if --int-ior is not a number.
     """
-    from ..thesis.methods import Gain
-
     if not args.relative:
         if args.int_ior is not None:
             args.parser.error("argument --int-ior: only for --relative, or without a method")
@@ -161,8 +170,6 @@ def run(args: argparse.Namespace) -> Figures:
     if args.spectral and not exr:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
 
-    from ..analysis.maps import Bands, LightDirection, check_map, save_exr, save_png
-
     spectrum = options.wavelengths(args)
     bands = Bands.choose(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
     evaluate = _by_bsdf if args.method is None else _by_method
@@ -192,9 +199,6 @@ def _by_bsdf(
     args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
 ) -> tuple[Any, str, str]:
     """Map the renderer's BSDF; also return its surface and the variant in words."""
-    from ..analysis.maps import brdf_map, check_variant
-    from ..analysis.scans import check_surface
-
     variant = set_variant(args.mode)
     check_variant(bands, args.illuminant, args.spectral)
     notes = _notes(args)
@@ -228,8 +232,6 @@ def _by_method(
     args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
 ) -> tuple[Any, str, str]:
     """Map a method of the thesis; also return its surface and the method in words."""
-    from ..thesis.methods import make, method_map
-
     samples, single = args.samples or 1, args.wavelength
     gain = gain_of(args)
     patch, settings = options.load_patch(args)
@@ -267,11 +269,6 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
-    from ..analysis.media import medium_index
-    from ..analysis.scans import bsdf_of
-    from ..plugin.dictionary import bsdf_dict
-    from ..plugin.presets import preset
-
     parameters = options.table_options(args, tuple(_TABLE)) | surface_parameters(args)
     if (index := medium_index(args.ext_ior)) != 1.0:
         if args.preset is None and kind_of(args.source) in (FileKind.TABLE, FileKind.ORDERS):

@@ -13,14 +13,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..analysis.known_wavelengths import check_material
+from ..analysis.media import in_medium, medium_index, optical_scale
+from ..analysis.scans import bsdf_of, check_surface, table_of
+from ..analysis.spectra import brdf_values, table_range
 from ..errors import DiffractionError, DiffractionWarning, counted
 from ..heights import HeightField, dominant_periods
 from ..heights.coherence import resolved_width
 from ..heights.spectra import Periodicity
 from ..images import save_figure
+from ..plugin.dictionary import bsdf_dict
 from ..scene import set_variant
 from ..settings import TableSettings
 from ..tables import TableSource
+from ..thesis.methods import make
+from ..thesis.methods.method import trapezoid_rule
+from ..thesis.methods.periods import check_period
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
@@ -127,9 +135,6 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
         raise DiffractionError(
             f"method={args.method} reflects all light; leave the material out, or the method"
         )
-    from ..analysis.media import in_medium, medium_index
-    from ..thesis.methods.method import trapezoid_rule
-    from ..thesis.methods.periods import check_period
     from ..thesis.period_fit import Beam
     from ..thesis.period_fit.ridge import check_axes
     from ..thesis.period_fit.windows import MOST_WINDOWS
@@ -188,16 +193,8 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     """Return the BRDF to measure and σ of its window: a method's, or of a surface of a material."""
     within, settings = experiment.within, experiment.settings
     if args.method != "spectral" or settings.get("coherence") == "patch":
-        from ..thesis.methods import make
-
         method = make(args.method, within.field(), period=args.period, progress=bar, **settings)
         return method.brdf, method.sigma
-    from ..analysis.known_wavelengths import check_material
-    from ..analysis.media import optical_scale
-    from ..analysis.scans import bsdf_of, check_surface, table_of
-    from ..analysis.spectra import brdf_values, table_range
-    from ..plugin.dictionary import bsdf_dict
-
     steps = experiment.steps
     check_material(args.material, steps, args.pigment)
     set_variant("llvm_ad_spectral")
@@ -286,7 +283,6 @@ def _windows(
     """Measure single windows by the thesis' procedure: lines to print, and entries of the NPZ."""
     if args.positions == 0 or fit is None:
         return [], {}
-    from ..thesis.methods import make
     from ..thesis.period_fit import thesis_fit, window_fits
 
     _, within, settings, _, _, beam, steps, angles = experiment

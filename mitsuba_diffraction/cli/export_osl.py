@@ -10,6 +10,7 @@ from pathlib import Path
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from ..plugin.presets import presets
 from ..scene import set_variant
 from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
@@ -94,7 +95,6 @@ def _addon(args: argparse.Namespace) -> Figures:
 def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
     """Export all presets that the shaders show; say in a line which they do not."""
     from ..osl import export
-    from ..plugin.presets import presets
 
     set_variant(args.mode)
     folders = {}

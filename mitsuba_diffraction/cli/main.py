@@ -1,8 +1,8 @@
 """Parser of the command line, and the boundary at which every error becomes one line.
 
 A sub-command is a function that `options.command` declares. It returns its figures, for --json, and
-sets `args.code` to end with another exit code than 0. What the parser does not load, it imports
-when called (Matplotlib and SciPy's larger parts above all), so that `--help` answers soon.
+sets `args.code` to end with another exit code than 0. What takes long to load it imports when
+called (Matplotlib and SciPy's larger parts above all), so that `--help` answers soon.
 """
 
 from __future__ import annotations

@@ -8,24 +8,26 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..analysis.crops import crops_of
+from ..analysis.media import follow, in_medium, loaded_in_media, medium_index, optical_scale
+from ..analysis.scans import bsdf_of, table_of
+from ..analysis.spectra import Spectra, spectrum, table_range
+from ..analysis.spectrometer import MeasurementGeometry
+from ..analysis.treatments import Treatment, load_treatments, treatment_for
 from ..errors import DiffractionError, counted
 from ..files import FileKind
 from ..heights import dominant_periods, stands_in_full
 from ..heights.coherence import blur
 from ..heights.source import notes_line
+from ..plugin.dictionary import bsdf_dict
 from ..settings import TableSettings
 from ..tables import DiffractionTable, TableSource
 from ..tables.source import loaded_table
 from . import options
 from .brdf_map import surface_parameters
 from .console import Bar, say
-
-if TYPE_CHECKING:
-    from ..analysis.spectra import Spectra
-    from ..analysis.spectrometer import MeasurementGeometry
-    from ..analysis.treatments import Treatment
 
 
 @dataclass
@@ -50,7 +52,6 @@ class Measurement:
 
         It is treated as its name says; the command line precedes.
         """
-        from ..analysis.treatments import Treatment, load_treatments, treatment_for
         from ..orders.file import load_orders
 
         found = treatment_for(file, load_treatments(self.args.treatments))
@@ -61,8 +62,6 @@ class Measurement:
         if source.kind is FileKind.TABLE:
             return [self._of_table(loaded_table(file), file)]
         if self.args.crops is not None:
-            from ..analysis.crops import crops_of
-
             crops = crops_of(file, treatment.options, self.args.crops)
             return [self._of_heights(TableSource.of(crop), file, treatment) for crop in crops]
         return [self._of_heights(source.read(), file, treatment)]
@@ -112,10 +111,6 @@ class Measurement:
 
     def _of_heights(self, source: TableSource, file: Path, treatment: Treatment) -> Spectra:
         """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
-        from ..analysis.media import in_medium, medium_index, optical_scale
-        from ..analysis.scans import table_of
-        from ..analysis.spectra import table_range
-
         args, geometry, first = self.args, self.geometry, float(self.lam[0])
         asked = {**treatment.settings, **options.table_options(args, options.TABLE)}
         asked["wavelength_range"] = table_range(self.lam)
@@ -139,10 +134,6 @@ class Measurement:
     def _spectrum(self, table: Any, geometry: MeasurementGeometry, lam: Any) -> Spectra:
         """Measure the spectra of a table's BSDF; with --iridescence its variables, too."""
         from ..analysis.angular_variables import angular_variables
-        from ..analysis.media import follow, loaded_in_media
-        from ..analysis.scans import bsdf_of
-        from ..analysis.spectra import spectrum
-        from ..plugin.dictionary import bsdf_dict
 
         parameters = surface_parameters(self.args)
         bsdf = bsdf_of(bsdf_dict(table, **loaded_in_media(parameters)))

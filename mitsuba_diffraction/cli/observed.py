@@ -5,18 +5,19 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from ..analysis import observers
+from ..analysis.false_colour import false_colour_figure
+from ..analysis.observers import Eye
 from ..errors import DiffractionError
 from ..images import save_figure
+from ..scene.bands import SensorBands
 from ..scene.pictures import write_exr
 from . import options
 from .console import say
-
-if TYPE_CHECKING:
-    from ..analysis.observers import Eye
 
 #: The animal.
 OBSERVER = (
@@ -29,8 +30,6 @@ OBSERVER = (
 
 def eye_of(args: argparse.Namespace) -> Eye | None:
     """Return the eye of --observer, or None; options that it excludes are a usage error."""
-    from ..analysis import observers
-
     if args.observer is None:
         options.refuse(args, ["illuminant"], ": is for the eye of --observer; name one")
         return None
@@ -48,19 +47,14 @@ def bands_of(args: argparse.Namespace, eye: Eye, variant: str) -> Any:
     """
     if "_spectral" not in variant:
         raise DiffractionError(f"variant {variant}: an eye needs a spectral one; leave --mode out")
-    from ..analysis.observers import GRID, relit, responses
-    from ..scene.bands import SensorBands
-
-    seen = responses(eye) * relit(args.illuminant or "d65")
-    return SensorBands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
+    seen = observers.responses(eye) * observers.relit(args.illuminant or "d65")
+    return SensorBands(observers.GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
 
 
 def save_observed(
     args: argparse.Namespace, eye: Eye, picture: Any, exr: Path, origin: Mapping[str, str | int]
 ) -> list[Path]:
     """Write the channels, and the picture in false colour beside them; return the files."""
-    from ..analysis.false_colour import false_colour_figure
-
     channels = np.nan_to_num(np.array(picture, np.float64)[..., : len(eye.names)])
     dark = [n for n, total in zip(eye.names, channels.sum(axis=(0, 1)), strict=True) if not total]
     if dark:

@@ -21,6 +21,7 @@ from ..heights.source import notes_line
 from ..optics.display import VIEWS
 from ..settings import SETTINGS, TableSettings, checked
 from ..tables.build.checks import check_units, check_window, period_of, warnings_of
+from ..thesis.methods import NAMES
 from .report import Figures
 
 #: The values that `add_option` takes after the group.
@@ -40,9 +41,6 @@ LIMITS = (
     "colour, measure the layers and use a multilayer or FDTD program; deep gratings: "
     "'mitsuba-diffraction solve'."
 )
-
-#: Ways to add up a spectrum: names of `thesis.methods`, without its imports.
-METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
 #: Names of the options for reading heights.
 HEIGHTS = tuple(OPTIONS)
@@ -338,7 +336,7 @@ def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
 def method(default: str | None, text: str) -> tuple[Row, Row]:
     """Return the rows of the method that sums the spectrum, and of the period that some need."""
     period = "µm, for the methods that need one; default: estimated from the heights"
-    return ("--method", text, METHODS, default), ("--period D", period, float)
+    return ("--method", text, NAMES, default), ("--period D", period, float)
 
 
 def samples(least: int, default: int | None) -> tuple[Row, Row]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..cluster.jobs import build_on_workers
 from ..errors import counted, warn
 from ..files import FileKind, kind_of
 from ..heights import HeightField
@@ -93,8 +94,6 @@ def _built(
     """Build the table; also return what workers did for it, where they build windows."""
     if not on_workers(args):
         return build_with(fields, settings, bar), {}
-    from ..cluster.jobs import build_on_workers
-
     with client_of(args) as client:
         table, work = build_on_workers(fields, settings, client, bar)
         return table, work.summary()

@@ -9,8 +9,10 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..analysis.observers import Eye
+from ..cluster import FrameRequest
 from ..errors import DiffractionError, counted
 from ..extras import optional
 from ..scene import load_scene, set_variant
@@ -39,9 +41,6 @@ from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
 from .report import Figures, check_outputs, elapsed, exr_and_png, output_name, output_of
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
-
-if TYPE_CHECKING:
-    from ..analysis.observers import Eye
 
 
 @options.command(
@@ -121,8 +120,6 @@ def _denoised(output: Path) -> Path:
 def _on_workers(args: argparse.Namespace) -> Figures:
     parameters = scene_options.scene_parameters(args)
     output = _output(args)
-
-    from ..cluster import FrameRequest
 
     variant = set_variant(args.mode)
     keep = output.with_name(f"{output.name}.passes")
@@ -282,8 +279,6 @@ def _frames_on_workers(
     args: argparse.Namespace, to_do: Sequence[Frame], folder: Path, variant: str
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; return how many were finished, and what the workers did."""
-    from ..cluster import FrameRequest
-
     done = 0
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
     with client_of(args) as client:

@@ -12,6 +12,7 @@ from ..columns import save_numbers
 from ..images import save_figure
 from ..settings import TableSettings
 from ..tables.build.build import build_with
+from ..tables.powers import order_0_power
 from . import options
 from .console import Bar, say_warning
 from .report import Figures, beside, output_of
@@ -49,7 +50,6 @@ def run(args: argparse.Namespace) -> Figures:
         power_spectrum,
         rayleigh_rice_scatter,
     )
-    from ..tables.powers import order_0_power
 
     field, settings = options.load_patch(args)
     spectrum = power_spectrum(field)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..errors import DiffractionError, quoted
 from ..files import MESHES, OTHER_MESHES, FileKind, kind_of, readable_file
+from ..plugin.parameters import NAMES, REFLECTING
 from ..scene.parameters import Change, change_of
 from ..scene.stage import STUDIO
 from .options import MODE, whole_number
@@ -132,8 +133,6 @@ def put_on_stage(args: argparse.Namespace) -> None:
 
 def _change_looks(args: argparse.Namespace) -> None:
     """Put parameters of the surface behind the looks in place of the studio's surface."""
-    from ..plugin.parameters import NAMES, REFLECTING
-
     changes = "".join(f",{k}={v}" for k, v in args.parameters if k in NAMES[REFLECTING])
     args.parameters = [pair for pair in args.parameters if pair[0] not in NAMES[REFLECTING]]
     args.presets = [preset + changes for preset in args.presets]

@@ -10,6 +10,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..analysis.scans import check_surface
+from ..analysis.treatments import Treatment, load_treatments
+from ..cluster.workers import check_workers
 from ..errors import DiffractionError, counted
 from ..heights.coherence import ONE_WINDOW
 from ..scene.load import set_variant
@@ -108,9 +111,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     args.output = output_of(args, Path("survey"), files_in, make_folder=True)
     keep_in_mind(f"finished scans are in '{args.output}': run the command again to go on")
 
-    from ..analysis.scans import check_surface
     from ..analysis.survey import run_survey
-    from ..analysis.treatments import Treatment, load_treatments
 
     treatments = load_treatments(args.treatments)
     variant = set_variant(args.mode or "llvm_ad_rgb")
@@ -118,8 +119,6 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
         client = stack.enter_context(client_of(args)) if on_workers(args) else None
         if client is not None:
-            from ..cluster.workers import check_workers
-
             check_workers(client, variant)
             say_files(_read_by(args.files))
         bar = stack.enter_context(Bar(args, unit=" scans", delay=0))

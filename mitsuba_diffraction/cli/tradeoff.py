@@ -8,6 +8,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ..analysis.machine import describe_machine
+from ..analysis.timing import PIXEL
+from ..analysis.tradeoff import (
+    Budget,
+    measure,
+    measure_depths,
+    measure_wavelengths,
+    recommended,
+    settings,
+)
+from ..analysis.tradeoff.accuracy import Sample
+from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
 from ..errors import DiffractionWarning
 from ..heights import Source, gratings
 from ..heights.coherence import resolved_width
@@ -48,19 +60,6 @@ def run(args: argparse.Namespace) -> Figures:
     if args.heights is None:
         options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
     args.output = output_of(args, Path("tradeoff"), _files_in, make_folder=True)
-    from ..analysis.machine import describe_machine
-    from ..analysis.timing import PIXEL
-    from ..analysis.tradeoff import (
-        Budget,
-        measure,
-        measure_depths,
-        measure_wavelengths,
-        recommended,
-        settings,
-    )
-    from ..analysis.tradeoff.accuracy import Sample
-    from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
-
     side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
     if args.heights is None:
         field = gratings.elaphe_like(side * PIXEL, side)

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.cli.options import METHODS
 from mitsuba_diffraction.optics.materials import TISSUES
+from mitsuba_diffraction.thesis.methods import NAMES
 from tests.support.directions import polar
 
 QUICK = [
@@ -73,7 +73,7 @@ def test_in_a_medium_the_period_is_the_surface_s_own(run, heights, medium):
         assert np.nanmax(np.abs(saved["grating"] - saved["ridge"])) < 1.0
 
 
-@pytest.mark.parametrize("method", METHODS[1:])
+@pytest.mark.parametrize("method", NAMES[1:])
 def test_every_method_can_be_evaluated(run, heights, method):
     ran = run(
         "evaluate", heights, *EXACT, *QUICK[:-1], "0", "--method", method, "-o", "a.png"
