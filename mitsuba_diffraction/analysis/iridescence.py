@@ -21,6 +21,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from matplotlib.colors import rgb_to_hsv
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, median
 
@@ -104,8 +105,6 @@ class DiffractedLight:
         Hues are in linear sRGB, clipped to the display's gamut, in sextants of HSV around
         the primaries and their mixtures; "grey" has a saturation below `GREY`.
         """
-        from matplotlib.colors import rgb_to_hsv
-
         names, xyz = (*HUES, "grey"), self._coloured()
         if not len(xyz):
             return dict.fromkeys(names, 0.0)

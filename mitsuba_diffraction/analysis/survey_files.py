@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeGuard
+
+from matplotlib.figure import Figure
 
 from ..columns import save_rows
 from ..images import open_image, save_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SHEET = "sheet"
 #: Columns of a scan's files by suffix.
@@ -74,8 +73,6 @@ def _iridescence(row: Mapping[str, Any]) -> str:
 
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
-    from matplotlib.figure import Figure
-
     lines = math.ceil(len(rows) / _COLUMNS)
     figure = Figure(figsize=(2.2 * _COLUMNS, 2.7 * lines), dpi=100)
     # a map is 2.1 inches high, with a title of 0.6 above it
