@@ -11,15 +11,12 @@ import stat
 import numpy as np
 import pytest
 
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster
+from mitsuba_diffraction.cluster import jobs as jobs_module
 from mitsuba_diffraction.cluster import tasks
+from mitsuba_diffraction.cluster.jobs import OrderedMap
+from tests.support.scans import PIXEL, SETTINGS, rough
 from tests.support.systems import posix
-
-distributed = pytest.importorskip("distributed")
-
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
-from mitsuba_diffraction.cluster import jobs as jobs_module  # noqa: E402
-from mitsuba_diffraction.cluster.jobs import OrderedMap  # noqa: E402
-from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
 
 
 @pytest.fixture(scope="module")

@@ -13,28 +13,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster
+from mitsuba_diffraction.cluster import groups, workers
+from mitsuba_diffraction.cluster.jobs import build_on_workers
+from mitsuba_diffraction.cluster.kept import Kept
+from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task
+from mitsuba_diffraction.scene.passes import Span
+from mitsuba_diffraction.settings import TableSettings
+from tests.cluster.clusters import VARIANT, film, passes_of_picture, picture_of, rendered
+from tests.support import ROOT
+from tests.support.machine import python
+from tests.support.room import SCENE
+from tests.support.scans import PIXEL, SETTINGS, rough
+
 pytestmark = pytest.mark.thorough
-
-pytest.importorskip("distributed")
-
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
-from mitsuba_diffraction.cluster import groups, workers  # noqa: E402
-from mitsuba_diffraction.cluster.jobs import build_on_workers  # noqa: E402
-from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
-from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task  # noqa: E402
-from mitsuba_diffraction.scene.passes import Span  # noqa: E402
-from mitsuba_diffraction.settings import TableSettings  # noqa: E402
-from tests.cluster.clusters import (  # noqa: E402
-    VARIANT,
-    film,
-    passes_of_picture,
-    picture_of,
-    rendered,
-)
-from tests.support import ROOT  # noqa: E402
-from tests.support.machine import python  # noqa: E402
-from tests.support.room import SCENE  # noqa: E402
-from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
 
 
 def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected, three_groups):

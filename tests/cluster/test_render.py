@@ -6,30 +6,21 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import distributed
 import numpy as np
 import pytest
 
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.cluster import groups
+from mitsuba_diffraction.cluster.frames import FrameRequest
+from mitsuba_diffraction.cluster.kept import Kept
+from mitsuba_diffraction.cluster.tasks import run_task
+from mitsuba_diffraction.scene import Stop
+from mitsuba_diffraction.scene.passes import Span
+from tests.cluster.clusters import SPP, VARIANT, Recorder, film, picture_of, rendered, silent
+from tests.support.room import SCENE, pixels
+
 pytestmark = pytest.mark.thorough
-
-distributed = pytest.importorskip("distributed")
-
-from mitsuba_diffraction import DiffractionError  # noqa: E402
-from mitsuba_diffraction.cluster import groups  # noqa: E402
-from mitsuba_diffraction.cluster.frames import FrameRequest  # noqa: E402
-from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
-from mitsuba_diffraction.cluster.tasks import run_task  # noqa: E402
-from mitsuba_diffraction.scene import Stop  # noqa: E402
-from mitsuba_diffraction.scene.passes import Span  # noqa: E402
-from tests.cluster.clusters import (  # noqa: E402
-    SPP,
-    VARIANT,
-    Recorder,
-    film,
-    picture_of,
-    rendered,
-    silent,
-)
-from tests.support.room import SCENE, pixels  # noqa: E402
 
 
 @pytest.mark.parametrize(("count", "at_once", "sums"), [(1, 8, 1), (4, 2, 3)])

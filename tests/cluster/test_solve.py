@@ -7,20 +7,19 @@ import signal
 
 import pytest
 
-pytestmark = pytest.mark.thorough
-
-pytest.importorskip("distributed")
 pytest.importorskip("gratinglab")
 
-from mitsuba_diffraction import solve_orders  # noqa: E402
-from mitsuba_diffraction.cli import main  # noqa: E402
-from mitsuba_diffraction.cluster.workers import executor_of  # noqa: E402
-from mitsuba_diffraction.orders import OrderTable  # noqa: E402
-from mitsuba_diffraction.orders.solve import Settings  # noqa: E402
-from mitsuba_diffraction.orders.solve.jobs import Jobs  # noqa: E402
-from mitsuba_diffraction.orders.solve.profiles import sinusoidal  # noqa: E402
-from tests.support.machine import python  # noqa: E402
-from tests.support.orders import digest_in_file  # noqa: E402
+from mitsuba_diffraction import solve_orders
+from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.cluster.workers import executor_of
+from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction.orders.solve import Settings
+from mitsuba_diffraction.orders.solve.jobs import Jobs
+from mitsuba_diffraction.orders.solve.profiles import sinusoidal
+from tests.support.machine import python
+from tests.support.orders import digest_in_file
+
+pytestmark = pytest.mark.thorough
 
 # a perfect conductor has no third variable: some hundred solutions of milliseconds
 PROFILE = sinusoidal(0.5, 0.05)

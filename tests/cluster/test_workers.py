@@ -5,17 +5,16 @@ from __future__ import annotations
 import os
 import re
 
+import distributed
 import psutil
 import pytest
 
+from mitsuba_diffraction import DiffractionError, cluster
+from mitsuba_diffraction.cluster import workers
+from tests.cluster.clusters import VARIANT, Recorder, film, rendered
+from tests.support.machine import python
+
 pytestmark = pytest.mark.thorough
-
-distributed = pytest.importorskip("distributed")
-
-from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
-from mitsuba_diffraction.cluster import workers  # noqa: E402
-from tests.cluster.clusters import VARIANT, Recorder, film, rendered  # noqa: E402
-from tests.support.machine import python  # noqa: E402
 
 
 @pytest.mark.parametrize("number", range(3))
