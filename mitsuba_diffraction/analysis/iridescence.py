@@ -18,7 +18,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
+from matplotlib.colors import rgb_to_hsv
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, median
 
@@ -26,8 +29,10 @@ from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import sigma_of, wavenumber
+from ..plugin.memory import upload
 from ..tables import DiffractionTable
 from ..tables.powers import order_0_power, power_series
+from .maps.hemisphere import flat_interaction
 from .maps.result import LightDirection
 
 #: Coherence width of the index, µm; its lobes are 3.3° wide (half maximum, 550 nm, at the normal),
@@ -100,8 +105,6 @@ class DiffractedLight:
         Hues are in linear sRGB, clipped to the display's gamut, in sextants of HSV around
         the primaries and their mixtures; "grey" has a saturation below `GREY`.
         """
-        from matplotlib.colors import rgb_to_hsv
-
         names, xyz = (*HUES, "grey"), self._coloured()
         if not len(xyz):
             return dict.fromkeys(names, 0.0)
@@ -151,12 +154,6 @@ class MaterialFactor:
         bsdf : `diffraction` of the current variant, spectral and vectorised. Its pigment does not
             diffract and is left out; so is the scale by which energy is conserved.
         """
-        import drjit as dr
-        import mitsuba as mi
-
-        from ..plugin.memory import upload
-        from .maps.hemisphere import flat_interaction
-
         light = LightDirection(theta, 0.0)
         polar, azimuth = (np.radians(a) for a in np.meshgrid(_POLAR, _AZIMUTHS, indexing="ij"))
         cosine = np.maximum(np.cos(polar), 1e-4)

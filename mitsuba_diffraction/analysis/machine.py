@@ -6,6 +6,7 @@ import importlib.metadata
 import platform
 from typing import Any
 
+import drjit as dr
 import psutil
 
 from ..llvm import loaded_llvm_version
@@ -16,8 +17,6 @@ _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")
 
 def describe_machine() -> dict[str, Any]:
     """Return processor, cores, load of the last minute, memory, and versions of packages."""
-    import drjit as dr
-
     llvm = loaded_llvm_version()
     return {
         "processor": processor(),

@@ -6,14 +6,18 @@ import warnings
 from collections.abc import Mapping
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionWarning
 from ..heights import HeightField
+from ..plugin.dictionary import ORDERS, bsdf_dict
 from ..progress import Progress, silent
 from ..settings import TableSettings
 from ..tables import DiffractionTable, TableSource, providing
 from ..tables.build.build import build_with
+from .known_wavelengths import known_range
+from .media import medium_index
 
 # Of a flat patch whose table takes no time: µm, and parameters.
 _PIXEL, _QUICK = 0.05, {"coherence_width": 1.0, "energy_conserving": False}
@@ -28,8 +32,7 @@ def table_of(
 
     Raises a DiffractionError if no table can be made of the source.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+    with warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         return source.table(settings, progress=progress)
 
 
@@ -40,10 +43,6 @@ def check_surface(parameters: Mapping[str, Any]) -> None:
 
     Raises a DiffractionError if one does not, or the pigment varies over a mesh.
     """
-    from ..plugin.dictionary import bsdf_dict
-    from .known_wavelengths import known_range
-    from .media import medium_index
-
     medium_index(parameters.get("ext_ior"))
     known_range(parameters.get("material"), parameters.get("pigment"))
     flat = HeightField(np.zeros((2, 2)), _PIXEL, periodic=True)
@@ -57,10 +56,7 @@ def bsdf_of(values: Mapping[str, Any]) -> Any:
 
     Raises a DiffractionError if a parameter has no valid value; `mi.load_dict` would wrap it.
     """
-    import mitsuba as mi
-
     from ..orders.bsdf.diffraction_orders import DiffractionOrders
-    from ..plugin.dictionary import ORDERS
     from ..plugin.diffraction import Diffraction
 
     props = mi.Properties(values["type"])

@@ -8,9 +8,12 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 
 from ..arrays import Real
 from ..columns import save_numbers, save_rows
@@ -20,10 +23,6 @@ from .angular_variables import VARIABLES
 from .observers import Eye, contrasts, luminance_contrasts, noises, quantum_catches
 from .spectra import Spectra
 from .spectral_variables import colours_of, daylit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: Fewest detectors from which on a map of angle and wavelength is drawn beside curves.
 MAPPED = 8
@@ -144,8 +143,6 @@ def spectra_figure(groups: Groups | Spectra, title: str = "", azimuth: str = "")
 
     azimuth : of the lamp in words, where the scans of a mean have several.
     """
-    from matplotlib.figure import Figure
-
     if isinstance(groups, Spectra):
         groups = {"": groups}
     first = next(iter(groups.values()))
@@ -208,8 +205,6 @@ def _scale(axes: Axes, *spectra: Spectra) -> None:
 
 def _draw_map(figure: Figure, axes: Axes, spectra: Spectra, label: str) -> None:
     """Draw one group's spectra over angle and wavelength."""
-    from matplotlib.colors import LogNorm
-
     order = np.argsort(spectra.geometry.detectors)
     angles = np.array(spectra.geometry.detectors)[order]
     value = 100.0 * spectra.value[:, order]

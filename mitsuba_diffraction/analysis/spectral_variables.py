@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import rgb_to_hsv
 
 from ..arrays import Real
 from ..optics.colour import encode_srgb, linear_srgb, response
@@ -32,8 +33,6 @@ def colours_of(spectra: Spectra) -> list[dict[str, Any]]:
     S8 : (maximum − minimum)/B2; FWHM : full width at half of the maximum over the minimum, empty
     where the spectrum ends before.
     """
-    from matplotlib.colors import rgb_to_hsv
-
     lam, values = spectra.wavelength, spectra.value.T
     rows = []
     for name, curve, colour in zip(spectra.geometry.names, values, daylit(spectra), strict=True):

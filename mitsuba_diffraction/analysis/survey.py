@@ -18,7 +18,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import numpy as np
+from PIL import Image
 
 from ..atomic import atomic_path
 from ..cluster.jobs import run_jobs
@@ -28,7 +30,9 @@ from ..files import readable_file
 from ..heights import Source
 from ..heights.coherence import REPEATS, widest_window
 from ..heights.spectra import examine_periods
+from ..plugin.dictionary import bsdf_dict
 from ..progress import Progress, silent
+from ..scene import set_variant
 from ..tables import DiffractionTable, TableSource
 from ..tables.store import key_of
 from .crops import crops_of
@@ -91,8 +95,8 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
     files: dict[str, bytes] = {}
     try:
         job.files.require(contents or {})
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DiffractionWarning)  # the row has the table's warnings
+        # the row has the table's warnings
+        with warnings.catch_warnings(action="ignore", category=DiffractionWarning):
             files = _measure(job, row)
     except MissingFiles:
         raise
@@ -106,11 +110,6 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
 
 def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     """Fill the row of a scan, so far as no error ends it, and return table and map."""
-    import drjit as dr
-
-    from ..plugin.dictionary import bsdf_dict
-    from ..scene import set_variant
-
     set_variant(job.variant)
     if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
         dr.set_thread_count(job.threads)
@@ -183,9 +182,6 @@ def _material(job: Job, table: DiffractionTable) -> MaterialFactor:
 
     Mitsuba takes seconds to change the variant: it loads its integrators again.
     """
-    from ..plugin.dictionary import bsdf_dict
-    from ..scene import set_variant
-
     key = job.surface, job.theta, job.variant
     if key not in _materials:
         set_variant(job.variant.replace("rgb", "spectral"))  # wavelengths, not colours
@@ -206,8 +202,6 @@ def _exr(table: DiffractionTable) -> bytes:
 
 def _png(brdf_map: BrdfMap) -> bytes:
     """Encode the map as a PNG, the largest y first."""
-    from PIL import Image
-
     stream = io.BytesIO()
     pixels = np.round(255.0 * brdf_map.srgb(brdf_map.exposure())[::-1]).astype(np.uint8)
     Image.fromarray(pixels, "RGBA").save(stream, "PNG")
@@ -267,17 +261,19 @@ def run_survey(
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
     shown = tuple((surface or {}).items())
-    rows: dict[int, dict[str, Any]] = {}
-    jobs: dict[int, Job] = {}
     named: list[dict[str, str]] = []
+    rows: dict[int, dict[str, Any]] = {}  # those that are known, by their place in `named`
+    jobs: dict[int, Job] = {}
     for file in files:
         name = {"file": str(file), "sample": sample_of(file, repeats)}
         try:
             treatment = treatment_for(file, treatments).updated(common or Treatment())
-            job = Job(_files_of(file), treatment, theta, resolution, variant, threads, shown)
+            of_scan = SceneFiles.from_scene(readable_file(file), {})
+            Source.of(file)  # a recipe is checked
+            job = Job(of_scan, treatment, theta, resolution, variant, threads, shown)
             parts = [job] if crops is None else _crops_of(job, file, crops)
         except DiffractionError as error:
-            rows[len(named)] = {"reason": str(error)}
+            rows[len(named)] = name | {"reason": str(error)}
             named.append(name)
             continue
         for part in parts:
@@ -285,7 +281,7 @@ def run_survey(
             if stored is None:
                 jobs[len(named)] = part
             else:
-                rows[len(named)] = stored
+                rows[len(named)] = name | stored
             named.append(name)
     todo = list(jobs)
     files_of_jobs = [Path(named[n]["file"]).name for n in todo]
@@ -294,17 +290,18 @@ def run_survey(
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):
-            rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
+            rows[n] = named[n] | {"reason": f"{result.text} {result.worker}".strip()}
         else:
-            rows[n] = _store(scans, Path(named[n]["file"]), jobs[n], result)
-        write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
+            rows[n] = named[n] | _store(scans, Path(named[n]["file"]), jobs[n], result)
+        # complete even if Ctrl-C ends the next scan
+        write_rows(folder / TABLE, [rows[n] for n in sorted(rows)])
         progress(done, len(todo), _next(files_of_jobs, done, client))
-    result = write_rows(folder / TABLE, named, rows)
-    write_repeats(folder / SAMPLES, result)
-    ranking = ranked(result)
-    write_rows(folder / TABLE, ranking, dict(enumerate(ranking)))
+    every = [rows[n] for n in sorted(rows)]
+    write_repeats(folder / SAMPLES, every)
+    ranking = ranked(every)
+    write_rows(folder / TABLE, ranking)
     write_sheets(folder, ranking)
-    return result
+    return every
 
 
 def _next(names: Sequence[str], done: int, client: Any) -> str:
@@ -330,13 +327,6 @@ def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         return bool(row["reason"]), narrow, -(row.get("iridescent_light") or 0.0)
 
     return sorted(rows, key=place)
-
-
-def _files_of(file: Path) -> SceneFiles:
-    """Return the scan's files, after a check of the recipe if it is one."""
-    files = SceneFiles.from_scene(readable_file(file), {})
-    Source.of(file)
-    return files
 
 
 def _crops_of(job: Job, file: Path, count: int) -> list[Job]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeGuard
+
+from matplotlib.figure import Figure
 
 from ..columns import save_rows
-from ..images import save_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ..images import open_image, save_figure
 
 SHEET = "sheet"
 #: Columns of a scan's files by suffix.
@@ -22,21 +21,12 @@ _NEEDED = ("width_um", "iridescence", "iridescence_by_chance", "iridescent_light
 _COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
 
 
-def write_rows(
-    path: Path,
-    named: Sequence[Mapping[str, str]],
-    rows_by_number: Mapping[int, Mapping[str, Any]],
-) -> list[dict[str, Any]]:
-    """Write the measured rows in the order of the files as CSV, and return them.
-
-    named : columns that name each file, the first of its row.
-    """
-    rows = [{**named[n], **rows_by_number[n]} for n in sorted(rows_by_number)]
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows as CSV; columns that name a file, and the reason, come first."""
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     first = ("file", "sample", "reason")
     names = [*first, *(name for name in columns if name not in first)]
     save_rows(path, names, rows)
-    return rows
 
 
 def is_row(row: object) -> TypeGuard[dict[str, Any]]:
@@ -56,8 +46,6 @@ def is_row(row: object) -> TypeGuard[dict[str, Any]]:
 
 def is_map(file: Path) -> bool:
     """Say whether a file is a picture that a contact sheet can show."""
-    from ..images import open_image
-
     try:
         with open_image(file, ("PNG",)) as picture:
             picture.load()
@@ -85,10 +73,6 @@ def _iridescence(row: Mapping[str, Any]) -> str:
 
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
-    from matplotlib.figure import Figure
-
-    from ..images import open_image
-
     lines = math.ceil(len(rows) / _COLUMNS)
     figure = Figure(figsize=(2.2 * _COLUMNS, 2.7 * lines), dpi=100)
     # a map is 2.1 inches high, with a title of 0.6 above it

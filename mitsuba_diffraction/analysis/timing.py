@@ -69,8 +69,7 @@ def quiet_bsdf(
     patch: HeightField | DiffractionTable | str | os.PathLike[str], **parameters: Any
 ) -> Any:
     """Load the plugin with a patch, without warnings about the model's limits."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+    with warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         return mi.load_dict(bsdf_dict(patch, **parameters))
 
 

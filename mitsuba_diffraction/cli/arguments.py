@@ -8,12 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..inputs import note_input
+from ..scene.parameters import note_files
 
 #: Values in `args` that name outputs.
 OUTPUTS = ("output", "json", "addon")
-# Files that name further ones.
-_NAMING = (".xml", ".toml", ".gltf")
 
 
 def note_arguments(args: argparse.Namespace) -> None:
@@ -26,15 +24,7 @@ def note_arguments(args: argparse.Namespace) -> None:
         if name not in OUTPUTS:
             for text in dict.fromkeys(_texts(value)):
                 if os.path.isfile(text):
-                    _note(Path(text), parameters)
-
-
-def _note(file: Path, parameters: dict[str, str]) -> None:
-    note_input(file)
-    if file.suffix.lower() in _NAMING:
-        from ..scene.parameters import note_files
-
-        note_files(file, parameters)
+                    note_files(Path(text), parameters)
 
 
 def _texts(value: Any) -> Iterator[str]:

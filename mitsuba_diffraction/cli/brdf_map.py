@@ -8,17 +8,33 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from ..analysis.maps import (
+    Bands,
+    LightDirection,
+    brdf_map,
+    check_map,
+    check_variant,
+    save_exr,
+    save_png,
+)
+from ..analysis.media import medium_index
+from ..analysis.scans import bsdf_of, check_surface
 from ..errors import DiffractionError, DiffractionWarning, counted
 from ..files import FileKind, kind_of
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
+from ..plugin.description import Surface
+from ..plugin.dictionary import bsdf_dict
+from ..plugin.pigment import pigment_range
+from ..plugin.presets import find_preset, preset
 from ..scene import set_variant
 from ..settings import TableSettings
+from ..thesis.methods import Gain, make, method_map
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
 from .options import number_between
-from .report import Figures, elapsed, output_of
+from .report import Figures, elapsed, exr_and_png, output_of
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -89,13 +105,9 @@ def take_source(args: argparse.Namespace) -> None:
     if (args.source is None) == (args.preset is None):
         args.parser.error("name either SOURCE or --preset NAME")
     if args.preset is not None:
-        from ..plugin.presets import find_preset
-
         args.source = find_preset(args.preset).patch
     surface_parameters(args)
     if args.pigment is not None:
-        from ..plugin.pigment import pigment_range
-
         pigment_range(args.pigment)
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
@@ -105,8 +117,6 @@ def gain_of(args: argparse.Namespace) -> Any:
 
     Raises a DiffractionError if --int-ior is not a number.
     """
-    from ..thesis.methods import Gain
-
     if not args.relative:
         if args.int_ior is not None:
             args.parser.error("argument --int-ior: only for --relative, or without a method")
@@ -155,12 +165,10 @@ def run(args: argparse.Namespace) -> Figures:
     """Make the map, and return the figures."""
     take_source(args)
     _refuse_contradictions(args)
-    output = output_of(args, Path(f"{args.source.stem}-map.exr"), _files)
-    *exr, png = written = _files(output)
+    output = output_of(args, Path(f"{args.source.stem}-map.exr"), exr_and_png)
+    *exr, png = written = exr_and_png(output)
     if args.spectral and not exr:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
-
-    from ..analysis.maps import Bands, LightDirection, check_map, save_exr, save_png
 
     spectrum = options.wavelengths(args)
     bands = Bands.choose(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
@@ -187,19 +195,10 @@ def run(args: argparse.Namespace) -> Figures:
             "seconds": seconds}  # fmt: skip
 
 
-def _files(output: Path) -> list[Path]:
-    """Return the files of -o: an EXR and a PNG beside it, or only a PNG."""
-    png = output if output.suffix.lower() == ".png" else output.with_suffix(".png")
-    return list(dict.fromkeys((output, png)))
-
-
 def _by_bsdf(
     args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
 ) -> tuple[Any, str, str]:
     """Map the renderer's BSDF; also return its surface and the variant in words."""
-    from ..analysis.maps import brdf_map, check_variant
-    from ..analysis.scans import check_surface
-
     variant = set_variant(args.mode)
     check_variant(bands, args.illuminant, args.spectral)
     notes = _notes(args)
@@ -223,8 +222,8 @@ def _notes(args: argparse.Namespace) -> str:
     others = FileKind.TABLE, FileKind.ORDERS, FileKind.RECIPE
     if args.preset is not None or kind_of(args.source) in others:
         return ""
-    with warnings.catch_warnings():  # `surface_bsdf` reads the heights, too
-        warnings.simplefilter("ignore", DiffractionWarning)
+    # `surface_bsdf` reads the heights, too
+    with warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         patch, settings = options.load_patch(args)
         return options.notes(args, patch, TableSettings(**settings))
 
@@ -233,15 +232,12 @@ def _by_method(
     args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
 ) -> tuple[Any, str, str]:
     """Map a method of the thesis; also return its surface and the method in words."""
-    from ..thesis.methods import make, method_map
-
     samples, single = args.samples or 1, args.wavelength
     gain = gain_of(args)
     patch, settings = options.load_patch(args)
     if single is not None:
         spectrum = {"wavelength_range": (0.999 * single, 1.001 * single), "step": 0.001 * single}
-    with Bar(args) as bar, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+    with Bar(args) as bar, warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         method = make(
             args.method, patch, period=args.period, progress=bar,
             **settings, **spectrum,
@@ -273,13 +269,7 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
-    from ..analysis.media import medium_index
-    from ..analysis.scans import bsdf_of
-    from ..plugin.dictionary import bsdf_dict
-    from ..plugin.presets import preset
-
-    parameters = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
-    parameters |= surface_parameters(args)
+    parameters = options.table_options(args, tuple(_TABLE)) | surface_parameters(args)
     if (index := medium_index(args.ext_ior)) != 1.0:
         if args.preset is None and kind_of(args.source) in (FileKind.TABLE, FileKind.ORDERS):
             raise DiffractionError(
@@ -302,8 +292,6 @@ def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:
 
 def _surface(bsdf: Any) -> str:
     """Describe the reflecting surface in a line."""
-    from ..plugin.description import Surface
-
     described: Surface = bsdf.describe()
     turn, scale = described.orientation.number, described.height_scale.number
     turned = [f"turned by {turn:g}°"] if turn != 0.0 else []

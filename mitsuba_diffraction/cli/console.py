@@ -13,6 +13,8 @@ import warnings
 from collections.abc import Iterator
 from typing import Any, Self
 
+import mitsuba as mi
+
 from ..errors import DiffractionWarning, one_line, shortened
 from ..progress import showing
 
@@ -80,8 +82,6 @@ def mitsuba_warnings() -> Iterator[None]:
 
     A variant must be set.
     """
-    import mitsuba as mi
-
     say = functools.cache(say_warning)
 
     class Lines(mi.Appender):

@@ -11,9 +11,24 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from ..analysis.known_wavelengths import check_material
+from ..analysis.media import in_medium, medium_index, optical_scale
+from ..analysis.scans import bsdf_of, check_surface, table_of
+from ..analysis.spectra import brdf_values, table_range
 from ..errors import DiffractionError, DiffractionWarning, counted
+from ..heights import HeightField, dominant_periods
+from ..heights.coherence import resolved_width
+from ..heights.spectra import Periodicity
 from ..images import save_figure
+from ..plugin.dictionary import bsdf_dict
+from ..scene import set_variant
 from ..settings import TableSettings
+from ..tables import TableSource
+from ..thesis.methods import make
+from ..thesis.methods.method import trapezoid_rule
+from ..thesis.methods.periods import check_period
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say_warning
@@ -21,9 +36,6 @@ from .options import whole_number
 from .report import Figures, beside, elapsed, output_of
 
 if TYPE_CHECKING:
-    from ..heights import HeightField
-    from ..heights.spectra import Periodicity
-    from ..tables import TableSource
     from ..thesis.period_fit import Beam, Fit, Response, Ridge
 
 # Single windows are fitted at about so many wavelengths: the period needs no more.
@@ -82,16 +94,26 @@ def run(args: argparse.Namespace) -> Figures:
     files = beside(".csv", ".npz")
     written = files(output_of(args, Path(f"{args.source.stem}-evaluation.png"), files))
     experiment = _prepared(args)
-    result = _measured(args, experiment)
-    report = [("spectrum", str(grating)) for grating in experiment.gratings] + result.lines
-    _write(args, experiment, result, report, written)
+    response, ridge, fit, lines, figures = _measured(args, experiment)
+    from ..thesis.period_fit.plot import figure, save_csv, save_npz
+
+    report = [("spectrum", str(grating)) for grating in experiment.gratings] + lines
+    period = figures["fitted_period"] if args.period is None else args.period
+    picture = figure(
+        response, ridge if fit else None, None if math.isnan(period) else period,
+        order=args.order, title=experiment.patch.name,
+        notes="\n".join(f"{name}: {text}" for name, text in report),
+    )  # fmt: skip
+    save_figure(written[0], picture)
+    save_csv(written[1], ridge, period)
+    save_npz(written[2], ridge, period, figures)
     print(
         f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
         f"{experiment.beam}, {counted(experiment.steps.size, 'wavelength')}, "
         f"{counted(experiment.angles.size, 'angle')}, "
         f"{elapsed(args):.1f} s"
     )
-    if distance := _distance(args, result.ridge):
+    if distance := _distance(args, ridge):
         report.insert(len(experiment.gratings) + 1, ("given", distance))
     for name, text in report:
         print(f"  {name:<9} {text}")
@@ -101,8 +123,8 @@ def run(args: argparse.Namespace) -> Figures:
     )
     if notes := options.notes(args, experiment.patch, asked):
         say_warning(notes)
-    figures, beam = result.figures, experiment.beam
-    print(f"  {'period':<9} {_published(result.fit, figures.get('window_error'))}")
+    beam = experiment.beam
+    print(f"  {'period':<9} {_published(fit, figures.get('window_error'))}")
     return {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
             "phi": beam.phi, **figures}  # fmt: skip
 
@@ -113,11 +135,6 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
         raise DiffractionError(
             f"method={args.method} reflects all light; leave the material out, or the method"
         )
-    from ..analysis.media import in_medium, medium_index
-    from ..heights import dominant_periods
-    from ..tables import TableSource
-    from ..thesis.methods.method import trapezoid_rule
-    from ..thesis.methods.periods import check_period
     from ..thesis.period_fit import Beam
     from ..thesis.period_fit.ridge import check_axes
     from ..thesis.period_fit.windows import MOST_WINDOWS
@@ -143,32 +160,20 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
     return _Experiment(patch, within, {**settings, **spectrum}, gratings, held, beam, steps, angles)
 
 
-class _Result(NamedTuple):
-    """Response of the patch, its ridge of maxima and the fit of the period.
+def _measured(
+    args: argparse.Namespace, experiment: _Experiment
+) -> tuple[Response, Ridge, Fit | None, list[tuple[str, str]], dict[str, Any]]:
+    """Measure and fit the patch, and single windows.
 
-    The ridge is empty and the fit None if no period fits.
-
-    Attributes
-    ----------
-    lines : label and text of each line for people.
-    figures : entries of the NPZ file.
+    Returns the response, its ridge of maxima, the fit of the period, lines to print, each with its
+    label, and entries of the NPZ file. The ridge is empty and the fit None if no period fits.
     """
-
-    response: Response
-    ridge: Ridge
-    fit: Fit | None
-    lines: list[tuple[str, str]]
-    figures: dict[str, Any]
-
-
-def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
-    """Measure and fit the patch, and single windows."""
-    from ..heights.coherence import resolved_width
     from ..thesis.period_fit import measure
 
     patch, _, settings, _, held, beam, steps, angles = experiment
-    with Bar(args) as bar, mitsuba_warnings(), warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)  # `options.notes` has them
+    # `options.notes` has them
+    quiet = warnings.catch_warnings(action="ignore", category=DiffractionWarning)
+    with Bar(args) as bar, mitsuba_warnings(), quiet:
         brdf, sigma = _brdf(args, experiment, bar)
         response = measure(
             brdf, beam, steps, angles, sigma=sigma, label=args.method, progress=bar,
@@ -181,24 +186,15 @@ def _measured(args: argparse.Namespace, experiment: _Experiment) -> _Result:
                "residual": math.nan if fit is None else fit.residual,
                "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
                "source": str(args.source)}  # fmt: skip
-    return _Result(response, ridge, fit, [("fitted", line), *lines], figures)
+    return response, ridge, fit, [("fitted", line), *lines], figures
 
 
 def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
     """Return the BRDF to measure and σ of its window: a method's, or of a surface of a material."""
     within, settings = experiment.within, experiment.settings
     if args.method != "spectral" or settings.get("coherence") == "patch":
-        from ..thesis.methods import make
-
         method = make(args.method, within.field(), period=args.period, progress=bar, **settings)
         return method.brdf, method.sigma
-    from ..analysis.known_wavelengths import check_material
-    from ..analysis.media import optical_scale
-    from ..analysis.scans import bsdf_of, check_surface, table_of
-    from ..analysis.spectra import brdf_values, table_range
-    from ..plugin.dictionary import bsdf_dict
-    from ..scene import set_variant
-
     steps = experiment.steps
     check_material(args.material, steps, args.pigment)
     set_variant("llvm_ad_spectral")
@@ -210,29 +206,8 @@ def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[
     return partial(brdf_values, bsdf_of(bsdf_dict(table, **parameters))), table.sigma
 
 
-def _write(
-    args: argparse.Namespace, experiment: _Experiment, result: _Result,
-    report: Sequence[tuple[str, str]], written: Sequence[Path],
-) -> None:  # fmt: skip
-    """Write the picture, the ridge (CSV) and everything (NPZ)."""
-    from ..thesis.period_fit.plot import figure, save_csv, save_npz
-
-    response, ridge, fit, _, figures = result
-    period = figures["fitted_period"] if args.period is None else args.period
-    picture = figure(
-        response, ridge if fit else None, None if math.isnan(period) else period,
-        order=args.order, title=experiment.patch.name,
-        notes="\n".join(f"{name}: {text}" for name, text in report),
-    )  # fmt: skip
-    save_figure(written[0], picture)
-    save_csv(written[1], ridge, period)
-    save_npz(written[2], ridge, period, figures)
-
-
 def _distance(args: argparse.Namespace, ridge: Ridge) -> str:
     """Describe how far the ridge is from the period that is given; "" without either."""
-    import numpy as np
-
     if args.period is None:
         return ""
     apart = np.abs(ridge.angles - ridge.grating_angles(args.period))
@@ -255,8 +230,6 @@ def _followed(
 
     Raises a DiffractionError if there are too few maxima to look for one.
     """
-    import numpy as np
-
     from ..thesis.period_fit import FEWEST, Ridge, find_period, fit_period, ridge_of
 
     period = find_period(response, held, order)
@@ -284,8 +257,6 @@ def viewing_angles(
 
     Raises a DiffractionError if the range is empty or the step does not fit it.
     """
-    import numpy as np
-
     sign = 1 if order > 0 else -1
     end = 80.0
     if reach is not None:
@@ -312,7 +283,6 @@ def _windows(
     """Measure single windows by the thesis' procedure: lines to print, and entries of the NPZ."""
     if args.positions == 0 or fit is None:
         return [], {}
-    from ..thesis.methods import make
     from ..thesis.period_fit import thesis_fit, window_fits
 
     _, within, settings, _, _, beam, steps, angles = experiment

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError, counted
+from ..scene import set_variant
 from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings
@@ -50,13 +51,12 @@ _SUFFIXES = {
 def run(args: argparse.Namespace) -> Figures:
     """Write the file, and return the figures."""
     take_source(args)
-    output = output_of(args, Path(f"{args.source.stem}.{_default_suffix(args.format)}"))
+    suffix = {"bird": ".json", "csv": ".csv"}.get(args.format, ".bsdf")
+    output = output_of(args, Path(f"{args.source.stem}{suffix}"))
     suffix = output.suffix.lower()
     name = args.format or next(name for name, known in _SUFFIXES.items() if suffix in known)
     if suffix not in _SUFFIXES[name]:
         raise DiffractionError(f"-o {output}: {name} files end in {' or '.join(_SUFFIXES[name])}")
-
-    from ..scene import set_variant
 
     set_variant(args.mode)
     from ..analysis.export import rgl, scatter, zemax
@@ -83,7 +83,3 @@ def run(args: argparse.Namespace) -> Figures:
     return {"source": args.source, "file": output, "format": name, "bytes": size,
             "theta": grid.theta.tolist(), "phi": grid.phi.tolist(),
             "wavelengths": grid.wavelengths.tolist()}  # fmt: skip
-
-
-def _default_suffix(name: str | None) -> str:
-    return {"bird": "json", "csv": "csv"}.get(name or "", "bsdf")

@@ -7,7 +7,11 @@ import re
 import tempfile
 from pathlib import Path
 
+import mitsuba as mi
+
 from ..errors import DiffractionError
+from ..plugin.presets import presets
+from ..scene import set_variant
 from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings, say_warning
@@ -48,7 +52,6 @@ def run(args: argparse.Namespace) -> Figures:
         return [folder / f"{name}{suffix}" for suffix in (".osl", ".json")]
 
     from ..osl import check_name, export
-    from ..scene import set_variant
 
     check_name(name)  # before the folder and the tables are made
     folder = output_of(args, Path(f"{look}-osl"), files_in, make_folder=True)
@@ -91,11 +94,7 @@ def _addon(args: argparse.Namespace) -> Figures:
 
 def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
     """Export all presets that the shaders show; say in a line which they do not."""
-    import mitsuba as mi
-
     from ..osl import export
-    from ..plugin.presets import presets
-    from ..scene import set_variant
 
     set_variant(args.mode)
     folders = {}

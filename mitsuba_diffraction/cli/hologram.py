@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..scene import set_variant
 from . import options
 from .console import mitsuba_warnings
 from .options import number_between, whole_number
@@ -33,7 +34,7 @@ from .report import Figures, output_of
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the folder, print the colours, and return the figures."""
-    from ..scene import label, set_variant
+    from ..scene import label
     from ..scene.logo import areas
 
     default = Path(f"{args.picture.stem}_hologram")

@@ -5,19 +5,24 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import mitsuba as mi
 
 from ..errors import DiffractionError
 from ..files import GLTF, MESHES, FileKind
+from ..gltf import materials_of
+from ..heights import HeightField, Recipe, Source, jumping_lines
+from ..heights.coherence import resolved, width_reason
+from ..heights.formats.catalogue import sections
+from ..heights.spectra import LEAST_SHARE, examine_periods
 from ..images import save_figure
 from ..settings import TableSettings
+from ..tables import DiffractionTable
 from . import options
 from .console import Bar, mitsuba_warnings
 from .options import path_ending_in
 from .report import STDOUT, Figures, lines_of, plain
-
-if TYPE_CHECKING:
-    from ..heights import HeightField, Recipe, Source
 
 # What `render MESH` and `tangents` do with a mesh without normals
 _SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV edges stay"
@@ -52,8 +57,6 @@ def run(args: argparse.Namespace) -> Figures:
         return _formats(args)
     if args.file is None:
         args.parser.error("name a file, or give --formats")
-    from ..heights import Source
-
     source = Source.of(args.file, options.load_options(args))
     others = FileKind.TABLE, FileKind.ORDERS, FileKind.MESH, FileKind.SCENE
     if source.kind not in others:
@@ -71,7 +74,6 @@ def run(args: argparse.Namespace) -> Figures:
     if args.energy or args.albedo is not None:
         from ..analysis.energy import energy_summary, energy_warnings, sides_summary
         from ..analysis.pictures import albedo_figure
-        from ..tables import DiffractionTable
 
         table = DiffractionTable.load(args.file)
     if args.energy:
@@ -95,8 +97,6 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _formats(args: argparse.Namespace) -> Figures:
     """Print the formats of scans, and return the figures."""
-    from ..heights.formats.catalogue import sections
-
     data = sections()
     if args.json == STDOUT:
         print(json.dumps(data, indent=2, ensure_ascii=False))
@@ -112,40 +112,27 @@ def _formats(args: argparse.Namespace) -> Figures:
 
 
 def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
-    from ..orders.file import load_orders
-
     file, kind = args.file, source.kind
     if source.recipe is not None:
         return _recipe(source, source.recipe, args)
-    if kind is FileKind.MESH:
-        _refuse_heights_options(args, "a mesh")
-        return _mesh(file)
     if kind is FileKind.SCENE:
         raise DiffractionError(
             f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
             "a scene names: tables, heights (images, NPY, text, instrument files), recipes (TOML) "
             f"and meshes ({', '.join(MESHES)})"
         )
-    if kind is FileKind.TABLE:
-        from ..tables import DiffractionTable
+    if kind not in (FileKind.TABLE, FileKind.ORDERS, FileKind.MESH):
+        return _heights(source, args)
+    options.refuse(args, (*options.HEIGHTS, *_TABLE), f": '{file}' is a {kind}, not heights")
+    if kind is FileKind.MESH:
+        return _mesh(file)
+    from ..orders.file import load_orders
 
-        _refuse_heights_options(args, "a table")
-        return {"kind": "table", **DiffractionTable.load(file).summary()}
-    if kind is FileKind.ORDERS:
-        _refuse_heights_options(args, "a table of orders")
-        return {"kind": "table of orders", **load_orders(file).summary()}
-    return _heights(source, args)
-
-
-def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
-    names = (*options.HEIGHTS, *_TABLE)
-    options.refuse(args, names, f": '{args.file}' is {kind}, not heights")
+    load: Any = DiffractionTable.load if kind is FileKind.TABLE else load_orders
+    return {"kind": str(kind), **load(file).summary()}
 
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights import jumping_lines
-    from ..heights.coherence import resolved, width_reason
-
     field = source.field()
     settings = TableSettings(**options.table_options(args))
     warnings = options.table_warnings([field], settings)
@@ -162,8 +149,6 @@ def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
 
 def _periods(field: HeightField) -> dict[str, Any]:
     """Return the gratings of the patch, and a structure that is too weak for one, if any."""
-    from ..heights.spectra import LEAST_SHARE, examine_periods
-
     gratings, weak = examine_periods(field)
     described: dict[str, Any] = {"periods": [str(grating) for grating in gratings] or ["none"]}
     if weak is not None:
@@ -172,8 +157,6 @@ def _periods(field: HeightField) -> dict[str, Any]:
 
 
 def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.coherence import resolved, width_reason
-
     fields = source.fields()
     settings = TableSettings(**{**source.settings, **options.table_options(args)})
     return {
@@ -190,8 +173,6 @@ def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[st
 
 
 def _mesh(file: Path) -> dict[str, Any]:
-    import mitsuba as mi
-
     from ..scene.fitted_mesh import fit_of
     from ..scene.orientation.mesh_files import read_mesh
     from ..scene.orientation.tangents import check_tangents
@@ -201,7 +182,9 @@ def _mesh(file: Path) -> dict[str, Any]:
     with mitsuba_warnings():
         read = read_mesh(file)
         mesh, report = read.mesh, check_tangents(*read.mesh, read.orientation)
-    summary = report.summary()
+    materials = {}
+    if file.suffix.lower() in GLTF:  # names that --preset and --assign take
+        materials["materials"] = [each.name for each in materials_of(file)] or ["none"]
     try:
         fit: Any = fit_of(mesh.positions, file).summary()
     except DiffractionError as error:
@@ -210,15 +193,8 @@ def _mesh(file: Path) -> dict[str, Any]:
     return {
         "kind": "mesh",
         "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
-        **summary,
-        **({"materials": _materials(file)} if file.suffix.lower() in GLTF else {}),
+        **report.summary(),
+        **materials,
         "normals": "in the file" if read.own_normals else _SMOOTH,
         "fit of render MESH --patch FILE": fit,
     }
-
-
-def _materials(file: Path) -> list[str]:
-    """Return the names of a glTF file's materials, which --preset and --assign take."""
-    from ..gltf import materials_of
-
-    return [material.name for material in materials_of(file)] or ["none"]

@@ -1,8 +1,8 @@
 """Parser of the command line, and the boundary at which every error becomes one line.
 
 A sub-command is a function that `options.command` declares. It returns its figures, for --json, and
-sets `args.code` to end with another exit code than 0. It imports its modules (Mitsuba above all)
-when called, so that `--help` and `--version` answer at once.
+sets `args.code` to end with another exit code than 0. What takes long to load it imports when
+called (Matplotlib and SciPy's larger parts above all), so that `--help` answers soon.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from . import (
 from .arguments import note_arguments
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
-from .report import STDOUT, check_outputs, save_report
+from .report import STDOUT, check_outputs, save_json
 from .spellings import current
 
 #: The sub-commands, in the order of --help.
@@ -153,11 +153,13 @@ def _run(args: argparse.Namespace) -> int:
     _load_matplotlib()
     try:
         note_arguments(args)
-        if args.json not in (None, STDOUT):
-            check_outputs([args.json])
+        report = [args.json] if args.json not in (None, STDOUT) else []
+        check_outputs(report)
         retired(args.retired)
         args.began, args.code = time.perf_counter(), DONE
-        save_report(args, args.run(args))
+        figures = args.run(args)
+        for file in report if figures else []:
+            save_json(file, figures)
         sys.stdout.flush()
         code: int = args.code
         return code

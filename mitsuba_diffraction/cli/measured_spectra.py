@@ -8,20 +8,26 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..analysis.crops import crops_of
+from ..analysis.media import follow, in_medium, loaded_in_media, medium_index, optical_scale
+from ..analysis.scans import bsdf_of, table_of
+from ..analysis.spectra import Spectra, spectrum, table_range
+from ..analysis.spectrometer import MeasurementGeometry
+from ..analysis.treatments import Treatment, load_treatments, treatment_for
 from ..errors import DiffractionError, counted
 from ..files import FileKind
+from ..heights import dominant_periods, stands_in_full
+from ..heights.coherence import blur
+from ..heights.source import notes_line
+from ..plugin.dictionary import bsdf_dict
 from ..settings import TableSettings
+from ..tables import DiffractionTable, TableSource
+from ..tables.source import loaded_table
 from . import options
 from .brdf_map import surface_parameters
 from .console import Bar, say
-
-if TYPE_CHECKING:
-    from ..analysis.spectra import Spectra
-    from ..analysis.spectrometer import MeasurementGeometry
-    from ..analysis.treatments import Treatment
-    from ..tables.source import TableSource
 
 
 @dataclass
@@ -42,24 +48,23 @@ class Measurement:
     _say_once: Callable[[str], None] = field(default_factory=lambda: functools.cache(say))
 
     def of_file(self, file: Path) -> list[Spectra]:
-        """Measure the spectra of one file, or of its crops."""
-        from ..orders.file import load_orders
-        from ..tables import TableSource
-        from ..tables.source import loaded_table
+        """Measure the spectra of one file, or of its crops.
 
-        how = self._treatment(file).options
-        source = TableSource.of(file, how)
+        It is treated as its name says; the command line precedes.
+        """
+        from ..orders.file import load_orders
+
+        found = treatment_for(file, load_treatments(self.args.treatments))
+        treatment = found.updated(Treatment(options.load_options(self.args)))
+        source = TableSource.of(file, treatment.options)
         if source.kind is FileKind.ORDERS:
             return [self._of_table(load_orders(file), file)]
         if source.kind is FileKind.TABLE:
             return [self._of_table(loaded_table(file), file)]
         if self.args.crops is not None:
-            from ..analysis.crops import crops_of
-
-            crops = crops_of(file, how, self.args.crops)
-            return [self._of_heights(TableSource.of(crop), file, how) for crop in crops]
-        source = source.read()
-        return [self._of_heights(source, file, how)]
+            crops = crops_of(file, treatment.options, self.args.crops)
+            return [self._of_heights(TableSource.of(crop), file, treatment) for crop in crops]
+        return [self._of_heights(source.read(), file, treatment)]
 
     def say_notes(self) -> None:
         """Print the number of scans with notes, beside the notes of the first scan."""
@@ -67,17 +72,8 @@ class Measurement:
             others = counted(self._noted - 1, "more scan")
             say(f"notes on {others}: 'mitsuba-diffraction info' prints them")
 
-    def _treatment(self, file: Path) -> Treatment:
-        """Return how a file is read: by its name, and by the command line, which precedes."""
-        from ..analysis.treatments import Treatment, load_treatments, treatment_for
-
-        found = treatment_for(file, load_treatments(self.args.treatments))
-        return found.updated(Treatment(options.load_options(self.args)))
-
     def _of_table(self, table: Any, file: Path) -> Spectra:
         """Measure the spectra of a table."""
-        from ..tables import DiffractionTable
-
         args = self.args
         own = (*options.HEIGHTS, *options.TABLE, "crops", "ext_ior")
         if refused := options.given(args, own):
@@ -94,7 +90,7 @@ class Measurement:
         heights = isinstance(table, DiffractionTable)
         low, high = (table.wavelength_range[0], math.inf) if heights else table.wavelengths
         lam = self._within(low, high, file)
-        return self._spectrum(table, self.geometry, lam, angular=args.iridescence)
+        return self._spectrum(table, self.geometry, lam)
 
     def _within(self, low: float, high: float, file: Path) -> Any:
         """Return the wavelengths that a table has, nm.
@@ -113,23 +109,17 @@ class Measurement:
             self._say_once(f"'{file}' has light {known}: other wavelengths are left out")
         return inside
 
-    def _of_heights(self, source: TableSource, file: Path, how: Any) -> Spectra:
+    def _of_heights(self, source: TableSource, file: Path, treatment: Treatment) -> Spectra:
         """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
-        from ..analysis.media import in_medium, medium_index, optical_scale
-        from ..analysis.scans import table_of
-        from ..analysis.spectra import table_range
-        from ..heights import dominant_periods
-        from ..heights.coherence import blur
-        from ..heights.source import notes_line
-
         args, geometry, first = self.args, self.geometry, float(self.lam[0])
-        asked = {**self._treatment(file).settings, **options.table_options(args, options.TABLE)}
+        asked = {**treatment.settings, **options.table_options(args, options.TABLE)}
         asked["wavelength_range"] = table_range(self.lam)
         self.bar(0, 0, f"tabulating {file.name}")
         settings = source.settings_for(asked, optical_scale(surface_parameters(args)))
         within = in_medium(source, args.ext_ior, first)
         table = table_of(within, settings, self.bar)
-        line = notes_line(within.warnings(settings), file, how, TableSettings(**asked))
+        notes = within.warnings(settings)
+        line = notes_line(notes, file, treatment.options, TableSettings(**asked))
         if line and args.crops is None:
             self._say_first(line)
         if table.settings.window_width is not None:
@@ -139,17 +129,11 @@ class Measurement:
             geometry = replace(geometry, azimuth=gratings[0].direction if gratings else 0.0)
             found = f"across {gratings[0]}" if gratings else "0°, since there is no grating"
             say(f"{file.name}: azimuth {found}")
-        return self._spectrum(table, geometry, self.lam, angular=args.iridescence)
+        return self._spectrum(table, geometry, self.lam)
 
-    def _spectrum(
-        self, table: Any, geometry: MeasurementGeometry, lam: Any, *, angular: bool
-    ) -> Spectra:
-        """Measure the spectra of a table's BSDF, and its variables over all angles."""
+    def _spectrum(self, table: Any, geometry: MeasurementGeometry, lam: Any) -> Spectra:
+        """Measure the spectra of a table's BSDF; with --iridescence its variables, too."""
         from ..analysis.angular_variables import angular_variables
-        from ..analysis.media import follow, loaded_in_media
-        from ..analysis.scans import bsdf_of
-        from ..analysis.spectra import spectrum
-        from ..plugin.dictionary import bsdf_dict
 
         parameters = surface_parameters(self.args)
         bsdf = bsdf_of(bsdf_dict(table, **loaded_in_media(parameters)))
@@ -159,15 +143,13 @@ class Measurement:
             bsdf, geometry.light, geometry.detectors, light_azimuth=azimuth, acceptance=cone,
             relative=self.args.relative, wavelengths=lam, before=before, progress=self.bar,
         )  # fmt: skip
-        if not angular:
+        if not self.args.iridescence:
             return spectra
         variables = angular_variables(bsdf, lam, azimuth, cone, before, self.bar)
         return replace(spectra, angular=(variables,))
 
     def _say_first(self, line: str) -> None:
         """Print the notes on the first scan that has any, and warnings; count the others."""
-        from ..heights import stands_in_full
-
         self._noted += 1
         if self._noted == 1 or stands_in_full(line):
             say(line)

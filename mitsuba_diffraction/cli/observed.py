@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..errors import DiffractionError, counted
+from ..analysis import observers
+from ..analysis.false_colour import false_colour_figure
+from ..analysis.observers import Eye
+from ..errors import DiffractionError
 from ..images import save_figure
-from ..scene.passes import Result
+from ..scene.bands import SensorBands
 from ..scene.pictures import write_exr
 from . import options
 from .console import say
-from .report import Figures, elapsed
-
-if TYPE_CHECKING:
-    from ..analysis.observers import Eye
 
 #: The animal.
 OBSERVER = (
@@ -30,8 +30,6 @@ OBSERVER = (
 
 def eye_of(args: argparse.Namespace) -> Eye | None:
     """Return the eye of --observer, or None; options that it excludes are a usage error."""
-    from ..analysis import observers
-
     if args.observer is None:
         options.refuse(args, ["illuminant"], ": is for the eye of --observer; name one")
         return None
@@ -49,38 +47,23 @@ def bands_of(args: argparse.Namespace, eye: Eye, variant: str) -> Any:
     """
     if "_spectral" not in variant:
         raise DiffractionError(f"variant {variant}: an eye needs a spectral one; leave --mode out")
-    from ..analysis.observers import GRID, relit, responses
-    from ..scene.bands import SensorBands
-
-    seen = responses(eye) * relit(args.illuminant or "d65")
-    return SensorBands(GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
+    seen = observers.responses(eye) * observers.relit(args.illuminant or "d65")
+    return SensorBands(observers.GRID.tolist(), dict(zip(eye.names, seen.tolist(), strict=True)))
 
 
 def save_observed(
-    args: argparse.Namespace, eye: Eye, result: Result, exr: Path, png: Path, variant: str
-) -> Figures:
-    """Write the channels and the picture in false colour, and return the figures."""
-    from ..analysis.false_colour import false_colour_figure
-
-    channels = np.nan_to_num(np.array(result.bitmap, np.float64)[..., : len(eye.names)])
+    args: argparse.Namespace, eye: Eye, picture: Any, exr: Path, origin: Mapping[str, str | int]
+) -> list[Path]:
+    """Write the channels, and the picture in false colour beside them; return the files."""
+    channels = np.nan_to_num(np.array(picture, np.float64)[..., : len(eye.names)])
     dark = [n for n, total in zip(eye.names, channels.sum(axis=(0, 1)), strict=True) if not total]
     if dark:
         say(f"receptors without light: {', '.join(dark)}: lights of colours and d65 begin at 360 "
             "nm, sunsky at 320 nm; give spectra that reach further")  # fmt: skip
-    write_exr(
-        result.bitmap, exr,
-        {"scene": str(args.scene), "variant": variant, "seed": args.seed, "spp": result.spp,
-         "observer": args.observer, "illuminant": args.illuminant or "of the scene"},
-    )  # fmt: skip
+    seen = {"observer": args.observer, "illuminant": args.illuminant or "of the scene"}
+    write_exr(picture, exr, {"scene": str(args.scene), **origin, **seen})
     light = f", light: {Path(args.illuminant).stem}" if args.illuminant else ""
     title = f"{args.name.name} as {Path(args.observer).stem}{light}"
+    png = exr.with_suffix(".png")
     save_figure(png, false_colour_figure(channels, eye, args.exposure, title))
-    width, height = result.bitmap.size()
-    print(
-        f"{exr} and {png}: {width} x {height} pixels, channels {', '.join(eye.names)}, "
-        f"{counted(result.spp, 'sample')} per pixel, {elapsed(args):.1f} s, {variant}"
-    )
-    return {
-        "scene": args.scene, "files": [exr, png], "observer": args.observer,
-        "receptors": list(eye.names), "spp": result.spp,
-    }  # fmt: skip
+    return [exr, png]

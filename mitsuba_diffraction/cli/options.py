@@ -1,8 +1,7 @@
 """Commands, declared by `command`; options that several share, and types of arguments.
 
 A value that does not fit is a usage error that quotes it. Options are rows of values; the functions
-beside them read what is given. Modules of the library are imported where values are read, so that
---help answers at once.
+beside them read what is given.
 """
 
 from __future__ import annotations
@@ -12,17 +11,18 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import DiffractionError, quoted
-from ..heights import LoadOptions
+from ..heights import HeightField, LoadOptions, Source, units_warning
+from ..heights.coherence import resolved
 from ..heights.read import OPTIONS
+from ..heights.source import notes_line
 from ..optics.display import VIEWS
 from ..settings import SETTINGS, TableSettings, checked
+from ..tables.build.checks import check_units, check_window, period_of, warnings_of
+from ..thesis.methods import NAMES
 from .report import Figures
-
-if TYPE_CHECKING:
-    from ..heights import HeightField
 
 #: The values that `add_option` takes after the group.
 Row = tuple[Any, ...]
@@ -41,9 +41,6 @@ LIMITS = (
     "colour, measure the layers and use a multilayer or FDTD program; deep gratings: "
     "'mitsuba-diffraction solve'."
 )
-
-#: Ways to add up a spectrum: names of `thesis.methods`, without its imports.
-METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
 #: Names of the options for reading heights.
 HEIGHTS = tuple(OPTIONS)
@@ -200,7 +197,7 @@ def add_option(
 ) -> None:  # fmt: skip
     """Add an option, or an argument.
 
-    usage : names of the option and of its values, such as "-s --spp N"; "..." if they are many.
+    usage : names of the option and of its value, such as "-s --spp N"; "..." if there may be many.
     text : help; the default value is told at its end, unless the text tells a default.
     kind : type of a value; a tuple of choices; bool of a flag; or, of an option that may be given
         several times, a list of the type.
@@ -212,12 +209,10 @@ def add_option(
     how: dict[str, Any] = {"help": text}
     if not names:
         how["dest"] = values[0].lower()
-    if values[1:] == ["..."]:
-        how |= {"nargs": "+", "metavar": values[0]}
-    elif len(values) > 1:
-        how |= {"nargs": len(values), "metavar": tuple(values)}
-    elif values:
+    if values:
         how["metavar"] = values[0]
+    if values[1:] == ["..."]:
+        how["nargs"] = "+"
     if kind is bool:
         how["action"] = "store_true"
     elif isinstance(kind, list):
@@ -341,7 +336,7 @@ def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
 def method(default: str | None, text: str) -> tuple[Row, Row]:
     """Return the rows of the method that sums the spectrum, and of the period that some need."""
     period = "µm, for the methods that need one; default: estimated from the heights"
-    return ("--method", text, METHODS, default), ("--period D", period, float)
+    return ("--method", text, NAMES, default), ("--period D", period, float)
 
 
 def samples(least: int, default: int | None) -> tuple[Row, Row]:
@@ -363,8 +358,6 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
     Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
-    from ..heights import Source
-
     source = Source.of(args.source, load_options(args))
     settings = {**source.settings, **table_options(args)}
     return source.field(), {name: settings[name] for name in TABLE_NAMES if name in settings}
@@ -372,10 +365,6 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, and its refusal if size alone decides."""
-    from ..heights import units_warning
-    from ..heights.coherence import resolved
-    from ..tables.build.checks import check_units, check_window, period_of, warnings_of
-
     how = resolved(settings, fields)
     try:
         check_units(fields)
@@ -391,7 +380,5 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:
     """Return a line on the number of notes on heights and the command that prints them, or ""."""
-    from ..heights.source import notes_line
-
     lines = table_warnings([field], settings)
     return notes_line(lines, args.source, load_options(args), settings)

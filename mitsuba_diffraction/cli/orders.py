@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import counted
 from . import options
 from .options import number_between
@@ -42,8 +44,6 @@ from .report import Figures, output_of
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """List the orders, and return the figures."""
-    import numpy as np
-
     from ..orders.file import load_orders
     from ..orders.listing import WITH_PHASE, list_orders
 

@@ -6,20 +6,26 @@ import argparse
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import DiffractionError
 from ..progress import Progress
 from ..scene import load_scene, set_variant
 from ..scene.load import sensor_of
+from ..scene.planning.light import light_of_tables
+from ..scene.planning.plan import (
+    PlannedTable,
+    load_by_recipes,
+    load_limited,
+    plan_table,
+    recipe_files,
+    recipe_of,
+)
+from ..scene.planning.report import describe
 from . import options, scene_options
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, lines_of
-
-if TYPE_CHECKING:
-    from ..scene.planning.plan import PlannedTable
-
 
 PATHS, TOLERANCE = 1 << 17, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
@@ -74,9 +80,6 @@ def run(args: argparse.Namespace) -> Figures:
     if args.paths > _MOST_PATHS:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
-    from ..scene.planning.plan import recipe_files, recipe_of
-    from ..scene.planning.report import describe
-
     variant = planning_variant(args.mode)
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         planned = _planned(args, partial(load_scene, args.scene, parameters), bar)
@@ -107,8 +110,6 @@ def run(args: argparse.Namespace) -> Figures:
 def _planned(
     args: argparse.Namespace, load: Callable[[], Any], tell: Progress
 ) -> list[PlannedTable]:
-    from ..scene.planning.light import light_of_tables
-    from ..scene.planning.plan import plan_table
 
     tell(0, 0, "tracing paths")
     tables = light_of_tables(load, partial(sensor_of, index=args.sensor), args.paths)
@@ -123,8 +124,6 @@ def load_by_plan(
 
     Raises a DiffractionError if a recipe is for other surfaces.
     """
-    from ..scene.planning.plan import load_by_recipes, load_limited
-
     if "spectral" not in variant:
         say_warning(
             f"--plan: {variant} looks up a table of colours or one wavelength, which a plan does "

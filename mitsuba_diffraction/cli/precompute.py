@@ -6,21 +6,22 @@ import argparse
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..cluster.jobs import build_on_workers
 from ..errors import counted, warn
 from ..files import FileKind, kind_of
+from ..heights import HeightField
+from ..progress import Progress
+from ..settings import TableSettings
 from ..system import peak_memory
+from ..tables import DiffractionTable, TableSource
+from ..tables.build.build import build_with
+from ..tables.build.checks import warnings_of
 from . import options
 from .console import Bar
 from .report import Figures, check_outputs, output_name
 from .workers import WORKERS, client_of, on_workers
-
-if TYPE_CHECKING:
-    from ..heights import HeightField
-    from ..progress import Progress
-    from ..settings import TableSettings
-    from ..tables import DiffractionTable, TableSource
 
 
 @options.command(
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Build the table of each recipe, and return the figures."""
-    from ..tables import TableSource
-
     how = options.load_options(args)
     recipes = [source for source in args.sources if kind_of(source) is FileKind.RECIPE]
     if recipes and len(recipes) < len(args.sources):
@@ -59,8 +58,6 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]:
     """Build one table and return its summary; the folder of a recipe's output may be made."""
-    from ..tables.build.checks import warnings_of
-
     recipe, output = source.recipe, args.output
     make_folder = recipe is not None and output is None
     if recipe is None:
@@ -95,12 +92,8 @@ def _built(
     args: argparse.Namespace, fields: Sequence[HeightField], settings: TableSettings, bar: Progress
 ) -> tuple[DiffractionTable, dict[str, Any]]:
     """Build the table; also return what workers did for it, where they build windows."""
-    from ..tables.build.build import build_with
-
     if not on_workers(args):
         return build_with(fields, settings, bar), {}
-    from ..cluster.jobs import build_on_workers
-
     with client_of(args) as client:
         table, work = build_on_workers(fields, settings, client, bar)
         return table, work.summary()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from ..plugin.presets import presets
 from . import options
 from .report import Figures
 
@@ -15,8 +16,6 @@ from .report import Figures
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Print a line for each look, and return the figures."""
-    from ..plugin.presets import presets
-
     width = max(map(len, presets()))
     for preset in presets().values():
         print(f"{preset.name:{width}}  {preset.about}")

@@ -5,12 +5,14 @@ With --frames: which frames exist, why others are rendered, and their film."""
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
+from ..analysis.observers import Eye
+from ..cluster import FrameRequest
 from ..errors import DiffractionError, counted
 from ..extras import optional
 from ..scene import load_scene, set_variant
@@ -36,12 +38,9 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED, keep_in_mind
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
-from .report import Figures, check_outputs, default_output, elapsed, output_name, output_of
+from .report import Figures, check_outputs, elapsed, exr_and_png, output_name, output_of
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
-
-if TYPE_CHECKING:
-    from ..analysis.observers import Eye
 
 
 @options.command(
@@ -99,77 +98,46 @@ def run(args: argparse.Namespace) -> Figures:
     return _run_one(args, eye)
 
 
-class Outputs(NamedTuple):
-    """Files of a picture.
-
-    Attributes
-    ----------
-    named : the file of `-o`, an EXR or a PNG.
-    png : the PNG.
-    """
-
-    named: Path
-    png: Path
-
-    @classmethod
-    def called(cls, output: Path) -> Outputs:
-        """Return the files of an output of this name."""
-        return cls(
-            output, output if output.suffix.lower() == ".png" else output.with_suffix(".png")
-        )
-
-    @property
-    def only_png(self) -> bool:
-        """Whether no EXR is written."""
-        return self.named == self.png
-
-    @property
-    def denoised(self) -> list[Path]:
-        """Files of the denoised picture, of the same kinds."""
-        files = dict.fromkeys((self.named, self.png))
-        return [file.with_name(f"{file.stem}_denoised{file.suffix}") for file in files]
-
-
-def _outputs(args: argparse.Namespace) -> Outputs:
-    """Return the files of `-o`, or of its default, after checking that they can be written."""
+def _output(args: argparse.Namespace) -> Path:
+    """Return the file of `-o`, or its default, after checking that all files can be written."""
     if args.output is not None and args.output.suffix.lower() not in (".exr", ".png"):
         args.parser.error(
             f"argument -o: expected a name ending in .exr or .png, got {str(args.output)!r}"
         )
-    default = Path(default_output(args.name, ".exr").name)
-    return Outputs.called(output_of(args, default, partial(_files, args)))
+    return output_of(args, Path(f"{args.name.stem}.exr"), partial(_files, args))
 
 
 def _files(args: argparse.Namespace, output: Path) -> list[Path]:
     """Return all files of an output of this name."""
-    outputs = Outputs.called(output)
-    return [*outputs, *(outputs.denoised if args.denoise else ())]
+    return exr_and_png(output) + (exr_and_png(_denoised(output)) if args.denoise else [])
+
+
+def _denoised(output: Path) -> Path:
+    """Return the name of the denoised picture beside the noisy one."""
+    return output.with_name(f"{output.stem}_denoised{output.suffix}")
 
 
 def _on_workers(args: argparse.Namespace) -> Figures:
     parameters = scene_options.scene_parameters(args)
-    outputs = _outputs(args)
-
-    from ..cluster import FrameRequest
+    output = _output(args)
 
     variant = set_variant(args.mode)
-    keep = outputs.named.with_name(f"{outputs.named.name}.passes")
+    keep = output.with_name(f"{output.name}.passes")
     keep_in_mind(f"finished passes are kept in '{keep}': run the command again to go on")
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
-        if outputs.only_png:
-            _check_colours(args, outputs.png, film.scene, film.sensor)
+        _check_colours(args, output, film.scene, film.sensor)
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
-            for result in film.render(stop, bar):
-                report = _finish(args, result, outputs, variant, film.scene)
-                film.forget(0)
-                return report | {"workers": say_report(film)}
-    raise KeyboardInterrupt
+            reports = [_finish(args, result, output, variant, film.scene)
+                       for result in film.render(stop, bar)]  # fmt: skip
+        if not reports:
+            raise KeyboardInterrupt
+        return reports[0] | {"workers": say_report(film)}
 
 
 def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
     parameters = scene_options.scene_parameters(args)
-    outputs = _outputs(args)
+    output = _output(args)
     variant = set_variant(args.mode)
     bands = None if eye is None else bands_of(args, eye, variant)
     whole = partial(
@@ -181,9 +149,8 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
             scene = whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
             sensor = sensor_of(scene, args.sensor, args.preview)
             spp = args.spp or preview_samples(sensor, args.preview)
-            check_outputs(_files(args, outputs.named))  # of what only loading tells
-            if outputs.only_png:
-                _check_colours(args, outputs.png, scene, sensor)
+            check_outputs(_files(args, output))  # of what only loading tells
+            _check_colours(args, output, scene, sensor)
             with Stop() as stop:
                 result = render_passes(
                     scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop, progress=bar
@@ -193,60 +160,62 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
         if result.interrupted:
             say(f"interrupted; the picture has {result.spp} of {counted(spp, 'sample')} per pixel")
             args.code = INTERRUPTED
-        report = _finish(args, result, outputs, variant, scene, eye)
+        report = _finish(args, result, output, variant, scene, eye)
         if args.denoise:
             clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
-            _write_denoised(args, clean, outputs.denoised)
-            report["files"] += outputs.denoised
+            files = _written(args, clean, _denoised(output), {"denoised": "Open Image Denoise"})
+            print(f"{' and '.join(map(str, files))}: denoised")
+            report["files"] += files
     return report
 
 
 def _finish(
-    args: argparse.Namespace, result: Result, outputs: Outputs, variant: str, scene: Any,
+    args: argparse.Namespace, result: Result, output: Path, variant: str, scene: Any,
     eye: Eye | None = None,
 ) -> Figures:  # fmt: skip
     """Write the picture, print warnings and a summary, and return the figures for --json."""
     if bad := count_bad(result.bitmap):
         say_warning(f"{counted(bad, 'pixel')} not finite (NaN or infinite): black in a PNG")
-    if eye is not None:
-        return save_observed(args, eye, result, outputs.named, outputs.png, variant)
-    written = []
-    if not outputs.only_png:
-        origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}
-        write_exr(result.bitmap, outputs.named, {**origin, "spp": result.spp})
-        written.append(outputs.named)
-    colours = colours_of(result.bitmap)
-    if colours is None:
-        say_warning("the film holds no colours that a PNG could show; only the EXR was written")
+    origin = {"variant": variant, "seed": args.seed, "spp": result.spp}
+    channels, seen = "", {}
+    if eye is None:
+        written = _written(args, result.bitmap, output, origin)
     else:
-        write_png(colours, outputs.png, args.exposure, args.view)
-        written.append(outputs.png)
+        written = save_observed(args, eye, result.bitmap, output, origin)
+        channels = f"channels {', '.join(eye.names)}, "
+        seen = {"observer": args.observer, "receptors": list(eye.names)}
     (width, height), samples = result.bitmap.size(), counted(result.spp, "sample")
     seconds, surfaces = elapsed(args), surfaces_text(scene)
     print(
-        f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
-        f"{seconds:.1f} s, {variant}{surfaces}"
+        f"{' and '.join(map(str, written))}: {width} x {height} pixels, {channels}{samples} per "
+        f"pixel, {seconds:.1f} s, {variant}{surfaces}"
     )
     return {
         "scene": args.scene, "files": written, "pixels": [width, height],
-        "surfaces": surfaces.removeprefix("; "),
-        "spp": result.spp, "seed": args.seed, "variant": variant,
+        "surfaces": surfaces.removeprefix("; "), **origin, **seen,
         "interrupted": result.interrupted, "seconds": seconds,
     }  # fmt: skip
 
 
-def _write_denoised(args: argparse.Namespace, picture: Any, files: Sequence[Path]) -> None:
-    """Write the denoised picture beside the noisy one."""
-    for path in files:
-        if path.suffix.lower() == ".png":
-            write_png(picture, path, args.exposure, args.view)
-        else:
-            write_exr(picture, path, {"scene": str(args.scene), "denoised": "Open Image Denoise"})
-    print(f"{' and '.join(map(str, files))}: denoised")
+def _written(
+    args: argparse.Namespace, picture: Any, output: Path, origin: Mapping[str, str | int]
+) -> list[Path]:
+    """Write a picture, its PNG if the film holds colours; return the files."""
+    *exr, png = exr_and_png(output)
+    for path in exr:
+        write_exr(picture, path, {"scene": str(args.scene), **origin})
+    colours = colours_of(picture)
+    if colours is None:
+        say_warning("the film holds no colours that a PNG could show; only the EXR was written")
+        return exr
+    write_png(colours, png, args.exposure, args.view)
+    return [*exr, png]
 
 
 def _check_colours(args: argparse.Namespace, output: Path, scene: Any, sensor: Any) -> None:
-    """Refuse a film without colours for a PNG, before the work is done."""
+    """Refuse a film without colours for a PNG alone, before the work is done."""
+    if exr_and_png(output) != [output]:
+        return
     film = sensor.film()
     film.prepare(integrator_of(scene).aov_names())
     if colours_of(film.bitmap()) is None:
@@ -279,7 +248,12 @@ def _run_frames(args: argparse.Namespace) -> Figures:
             if on_workers(args):
                 done, workers = _frames_on_workers(args, to_do, folder, variant)
             else:
-                done = _frames_here(args, to_do, variant)
+                with Bar(args, unit=" spp", delay=0) as bar:
+                    bar(0, 0, "loading")
+                    here = render_frames(
+                        args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
+                    )
+                    done = sum(1 for _ in here)
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
               "interrupted": done < len(to_do), "seconds": elapsed(args),
@@ -301,30 +275,17 @@ def _run_frames(args: argparse.Namespace) -> Figures:
     return report | {"film": film}
 
 
-def _frames_here(args: argparse.Namespace, to_do: Sequence[Frame], variant: str) -> int:
-    """Render frames in this process; return how many were finished."""
-    with Bar(args, unit=" spp", delay=0) as bar:
-        bar(0, 0, "loading")
-        frames = render_frames(
-            args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
-        )  # fmt: skip
-        return sum(1 for _ in frames)
-
-
 def _frames_on_workers(
     args: argparse.Namespace, to_do: Sequence[Frame], folder: Path, variant: str
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; return how many were finished, and what the workers did."""
-    from ..cluster import FrameRequest
-
     done = 0
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
     with client_of(args) as client:
         film = film_of(args, client, wanted, variant, folder / "passes")
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
-            for frame, result in zip(to_do, film.render(stop, bar), strict=False):
+            for result, frame in zip(film.render(stop, bar), to_do, strict=False):
                 write_frame(frame, result.bitmap, args.scene, variant, args.exr)
-                film.forget(done)
                 done += 1
         return done, say_report(film)
 

@@ -80,12 +80,6 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def save_report(args: argparse.Namespace, figures: Figures) -> None:
-    """Write the file of --json, if it is requested and there are figures."""
-    if figures and args.json not in (None, STDOUT):
-        save_json(args.json, figures)
-
-
 def elapsed(args: argparse.Namespace) -> float:
     """Return the seconds since the command began."""
     return time.perf_counter() - args.began
@@ -168,16 +162,6 @@ def _check_folder(path: Path, make_folder: bool) -> None:
         ) from error
 
 
-def default_output(source: Path, suffix: str) -> Path:
-    """Return the name of an output that is called after its source.
-
-    Raises a DiffractionError if the source is a folder without a name, such as "." or "/".
-    """
-    if not source.name:
-        raise DiffractionError(f"'{source}' is a folder; name a file in it")
-    return source.with_suffix(suffix)
-
-
 def output_name(
     given: Path | None, default: Path, files: Callable[[Path], Iterable[Path]] = lambda path: [path]
 ) -> Path:
@@ -213,6 +197,11 @@ def output_of(
     output = output_name(args.output, default, files)
     check_outputs(files(output), make_folder=make_folder)
     return output
+
+
+def exr_and_png(output: Path) -> list[Path]:
+    """Return the files of a picture of this name: an EXR and the PNG beside it, or only a PNG."""
+    return [output] if output.suffix.lower() == ".png" else [output, output.with_suffix(".png")]
 
 
 def beside(*suffixes: str) -> Callable[[Path], list[Path]]:

@@ -6,8 +6,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..columns import save_numbers
 from ..images import save_figure
+from ..settings import TableSettings
+from ..tables.build.build import build_with
+from ..tables.powers import order_0_power
 from . import options
 from .console import Bar, say_warning
 from .report import Figures, beside, output_of
@@ -36,7 +41,6 @@ def run(args: argparse.Namespace) -> Figures:
     if not 10.0 <= ends[0] < ends[1] <= 1e5:
         args.parser.error("argument --wavelength: expected wavelengths from 11 to 99999 nm")
     output = output_of(args, Path(f"{args.source.stem}-scatter.csv"), beside(".png"))
-    import numpy as np
     from matplotlib.figure import Figure
 
     from ..heights.scatter import (
@@ -46,9 +50,6 @@ def run(args: argparse.Namespace) -> Figures:
         power_spectrum,
         rayleigh_rice_scatter,
     )
-    from ..settings import TableSettings
-    from ..tables.build.build import build_with
-    from ..tables.powers import order_0_power
 
     field, settings = options.load_patch(args)
     spectrum = power_spectrum(field)

@@ -11,7 +11,9 @@ from pathlib import Path
 
 from ..errors import DiffractionError, quoted
 from ..files import MESHES, OTHER_MESHES, FileKind, kind_of, readable_file
+from ..plugin.parameters import NAMES, REFLECTING
 from ..scene.parameters import Change, change_of
+from ..scene.stage import STUDIO
 from .options import MODE, whole_number
 
 #: Id of the BSDF of a scene's patch: of the studio, the material ball, plate, sphere and scales.
@@ -56,11 +58,15 @@ SCENE = (
 def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
     """Return the values of -D, --assign and --preset, as `load_scene` takes them.
 
-    A mesh in place of a scene is put into the studio, with its surface, by `put_on_stage`.
+    What is given twice is a usage error. A mesh in place of a scene is put into the studio, with
+    its surface, by `put_on_stage`.
     """
     from ..scene.surfaces import MATERIAL, PRESET
 
-    parameters = _definitions(args)
+    parameters = dict(args.parameters)
+    if len(parameters) < len(args.parameters):
+        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
+        args.parser.error(f"argument -D: {twice!r} is set more than once")
     surfaces = list(args.materials)
     for text in args.presets:
         head, comma, changes = text.partition(",")
@@ -83,8 +89,6 @@ def put_on_stage(args: argparse.Namespace) -> None:
 
     The scene is then the studio, and default names of outputs follow the mesh: `args.name`.
     """
-    from ..scene.stage import STUDIO
-
     args.name, suffix = args.scene, args.scene.suffix.lower()
     if suffix in OTHER_MESHES:
         raise DiffractionError(
@@ -129,18 +133,7 @@ def put_on_stage(args: argparse.Namespace) -> None:
 
 def _change_looks(args: argparse.Namespace) -> None:
     """Put parameters of the surface behind the looks in place of the studio's surface."""
-    from ..plugin.parameters import NAMES, REFLECTING
-
     changes = "".join(f",{k}={v}" for k, v in args.parameters if k in NAMES[REFLECTING])
     args.parameters = [pair for pair in args.parameters if pair[0] not in NAMES[REFLECTING]]
     args.presets = [preset + changes for preset in args.presets]
     args.materials = [(name, file + changes) for name, file in args.materials]
-
-
-def _definitions(args: argparse.Namespace) -> dict[str, str]:
-    """Return the values of -D; a parameter given twice is a usage error."""
-    parameters = dict(args.parameters)
-    if len(parameters) < len(args.parameters):
-        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
-        args.parser.error(f"argument -D: {twice!r} is set more than once")
-    return parameters

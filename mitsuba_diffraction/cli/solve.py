@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, counted
+from ..heights import HeightField, LoadOptions
+from ..heights.read import read_heights
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
@@ -17,7 +19,6 @@ from .report import Figures, check_outputs, output_name
 from .workers import WORKERS, executor_for
 
 if TYPE_CHECKING:
-    from ..heights import HeightField
     from ..orders import OrderTable
     from ..orders.solve.films import Layers
     from ..orders.solve.recipes import SolvedRecipe
@@ -134,7 +135,9 @@ def run(args: argparse.Namespace) -> Figures:
     if args.imports:
         from ..orders.imported import read_orders
 
-        _check_import(args)
+        if args.period is None:
+            args.parser.error("argument --import: needs --period, µm")
+        options.refuse(args, _SOLVED_ONLY, ": is for a solution; --import has efficiencies")
         check_outputs([output])
         period = (args.period, args.period_y) if args.period_y else args.period
         table: OrderTable = read_orders(source, period, superstrate=args.superstrate or 1.0)
@@ -158,44 +161,38 @@ def run(args: argparse.Namespace) -> Figures:
     return {"file": str(output), **table.summary()}
 
 
-def _check_import(args: argparse.Namespace) -> None:
-    """Refuse an import without its period, or with options of a solution."""
-    if args.period is None:
-        args.parser.error("argument --import: needs --period, µm")
-    options.refuse(args, _SOLVED_ONLY, ": is for a solution; --import has efficiencies")
-
-
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     """Return the problem of a recipe and of the options that override it."""
     from ..orders.solve.recipes import SolvedRecipe, profile_of
     from ..orders.solve.settings import Settings
 
-    source = Path(args.source)
+    source, output = Path(args.source), Path(f"{Path(args.source).stem}.nc")
+    shape = options.given(args, ("period", "depth", "duty", "direction"))
     if args.crossed:
         options.refuse(args, ("duty", "direction"), ": not allowed with --crossed")
-        cell, output = _unit_cell(source, args), args.output or Path(f"{source.stem}.nc")
-        recipe = SolvedRecipe(cell, "1.5", 1.0, False, Settings(), Path(output))
-        return _changed(recipe, args)
-    options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
-    shape = options.given(args, ("period", "depth", "duty", "direction"))
-    if source.suffix.lower() == ".toml":
-        options.refuse(args, shape, ": the recipe has the profile")
-        recipe = SolvedRecipe.load(source)
+        recipe = SolvedRecipe(_unit_cell(source, args), "1.5", 1.0, False, Settings(), output)
     else:
+        options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
         if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
             args.parser.error(
                 f"argument SOURCE: '{source}' holds no profile; for efficiencies add --import"
             )
-        profile = profile_of(args.source, shape)
-        recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), Path(f"{source.stem}.nc"))
-    return _changed(recipe, args)
+        if source.suffix.lower() == ".toml":
+            options.refuse(args, shape, ": the recipe has the profile")
+            recipe = SolvedRecipe.load(source)
+        else:
+            profile = profile_of(args.source, shape)
+            recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), output)
+    changed = options.given(args, _OF_A_RECIPE)
+    for name in ("layers", "beneath"):
+        if name in changed:
+            changed[name] = tuple(itertools.chain(*changed[name]))
+    settings = {_SETTINGS[name]: v for name, v in options.given(args, _SETTINGS).items()}
+    return replace(recipe, settings=replace(recipe.settings, **settings), **changed)
 
 
 def _unit_cell(source: Path, args: argparse.Namespace) -> HeightField:
     """Read one period of heights in x and y."""
-    from ..heights import LoadOptions
-    from ..heights.read import read_heights
-
     if args.period is None:
         args.parser.error("argument --crossed: needs --period, µm")
     cell = read_heights(
@@ -205,16 +202,6 @@ def _unit_cell(source: Path, args: argparse.Namespace) -> HeightField:
     rows, columns = cell.heights.shape
     sizes = args.period / columns, (args.period_y or args.period) / rows
     return replace(cell, pixel_size=sizes)
-
-
-def _changed(recipe: SolvedRecipe, args: argparse.Namespace) -> SolvedRecipe:
-    """Return a recipe with the options that override it."""
-    changed = options.given(args, _OF_A_RECIPE)
-    for name in ("layers", "beneath"):
-        if name in changed:
-            changed[name] = tuple(itertools.chain(*changed[name]))
-    settings = {_SETTINGS[name]: v for name, v in options.given(args, _SETTINGS).items()}
-    return replace(recipe, settings=replace(recipe.settings, **settings), **changed)
 
 
 def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:

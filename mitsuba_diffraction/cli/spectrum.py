@@ -7,8 +7,15 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from ..analysis.known_wavelengths import check_material, known_range
+from ..analysis.observers import eye_of, illuminant_of, quantum_catches
+from ..analysis.scans import check_surface
+from ..analysis.spectra import Spectra, mean_spectra
+from ..analysis.spectrometer import MeasurementGeometry, column_name
 from ..errors import DiffractionError, counted
 from ..images import save_figure
 from ..scene.load import set_variant
@@ -18,9 +25,6 @@ from .console import Bar, mitsuba_warnings, say
 from .measured_spectra import Measurement
 from .options import number_between, whole_number
 from .report import Figures, elapsed, output_of
-
-if TYPE_CHECKING:
-    from ..analysis.spectra import Spectra
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -108,9 +112,6 @@ def run(args: argparse.Namespace) -> Figures:
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
     from ..analysis import spectra_files as files_of_spectra
-    from ..analysis.scans import check_surface
-    from ..analysis.spectra import mean_spectra
-    from ..analysis.spectrometer import MeasurementGeometry
 
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
     auto = args.light_azimuth == "auto"
@@ -217,8 +218,6 @@ def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
         theirs = ("illuminant", "cone_ratios", "weber", "weber_luminance")
         options.refuse(args, theirs, ": belongs to --observer; name one")
         return None, None
-    from ..analysis.observers import eye_of, illuminant_of, quantum_catches
-
     asked = options.given(args, ("cone_ratios", "weber", "weber_luminance"))
     if "cone_ratios" in asked:
         asked["density"] = asked.pop("cone_ratios")
@@ -236,7 +235,6 @@ def _groups(args: argparse.Namespace) -> dict[str, list[Path]]:
     Raises a DiffractionError if a group matches no file, or is named twice.
     """
     from ..analysis.repeats import sample_of, scan_files
-    from ..analysis.spectrometer import column_name
 
     if bool(args.files) == bool(args.groups):
         args.parser.error("give files, or groups of them with --group NAME=PATTERN")
@@ -279,8 +277,6 @@ def _title(groups: dict[str, list[Path]], args: argparse.Namespace) -> str:
 
 def _wavelengths(args: argparse.Namespace) -> Any:
     """Return the wavelengths (n,) that are asked for, nm."""
-    import numpy as np
-
     first, last = args.wavelength_range or _RANGE
     if not 100.0 <= first <= last <= 10000.0:
         args.parser.error(
@@ -296,8 +292,6 @@ def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
 
     Raises a DiffractionError if --wavelength-range names others, or the material is unknown.
     """
-    from ..analysis.known_wavelengths import check_material, known_range
-
     if args.wavelength_range is None:
         first, last = known_range(args.material, args.pigment)
         known = lam[(lam >= first) & (lam <= last)]

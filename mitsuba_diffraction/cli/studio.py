@@ -11,6 +11,8 @@ from pathlib import Path
 from ..errors import DiffractionError, quoted
 from ..files import MESHES
 from ..heights.lengths import numbers_of
+from ..optics.materials import METALS, TISSUES
+from ..plugin.conductors import tabulated_range
 from ..scene.orbit import ORBIT
 from ..scene.parameters import parameters_of
 from ..scene.pictures import check_panorama
@@ -110,8 +112,5 @@ def _material(args: argparse.Namespace) -> dict[str, str]:
 
 def _is_metal(text: str) -> bool:
     """Whether a text names a conductor, by symbol or plain name."""
-    from ..optics.materials import METALS, TISSUES
-    from ..plugin.conductors import tabulated_range
-
     name = METALS.get(text.lower(), text)
     return name not in TISSUES and tabulated_range(name) is not None

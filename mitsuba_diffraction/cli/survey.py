@@ -10,8 +10,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..analysis.scans import check_surface
+from ..analysis.treatments import Treatment, load_treatments
+from ..cluster.workers import check_workers
 from ..errors import DiffractionError, counted
+from ..heights.coherence import ONE_WINDOW
 from ..scene.load import set_variant
+from ..scene.parameters import files_of
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
 from .console import Bar, mitsuba_warnings, say
@@ -57,7 +62,6 @@ def run(args: argparse.Namespace) -> Figures:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
     failed = sum(bool(row["reason"]) for row in rows)
     from ..analysis.iridescence import WINDOW
-    from ..heights.coherence import ONE_WINDOW
 
     wide = sorted(row["width_um"] for row in rows if not row["reason"])
     if wide and wide[-1] > _SIZES * max(wide[0], WINDOW):
@@ -91,8 +95,6 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _read_by(scans: Sequence[Path]) -> Iterator[Path]:
     """Yield the scans with the files that their recipes name; survey.csv tells of wrong recipes."""
-    from ..scene.parameters import files_of
-
     for scan in scans:
         with contextlib.suppress(DiffractionError):
             yield from files_of(scan)
@@ -109,9 +111,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     args.output = output_of(args, Path("survey"), files_in, make_folder=True)
     keep_in_mind(f"finished scans are in '{args.output}': run the command again to go on")
 
-    from ..analysis.scans import check_surface
     from ..analysis.survey import run_survey
-    from ..analysis.treatments import Treatment, load_treatments
 
     treatments = load_treatments(args.treatments)
     variant = set_variant(args.mode or "llvm_ad_rgb")
@@ -119,8 +119,6 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
         client = stack.enter_context(client_of(args)) if on_workers(args) else None
         if client is not None:
-            from ..cluster.workers import check_workers
-
             check_workers(client, variant)
             say_files(_read_by(args.files))
         bar = stack.enter_context(Bar(args, unit=" scans", delay=0))

@@ -8,17 +8,18 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from ..analysis.maps import LightDirection
+from ..analysis.maps.picture import contact_sheet
 from ..columns import save_rows
 from ..errors import DiffractionError, DiffractionWarning
 from ..images import save_figure
 from ..scene.load import set_variant
+from ..thesis.methods import NAMES
+from ..thesis.sweeps import SWEEPS, sweep, time_compiled
 from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
 from .report import Figures, beside, elapsed, output_of
-
-# Written out so that --help need not load what makes maps; a test holds them against the library.
-KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
 
 _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_exposure", "blueness")
 
@@ -29,7 +30,7 @@ _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_expos
     "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
     "sweep over methods also times the package's own look-up against flss with both "
     "compiled. Writes a picture, and the numbers as CSV beside it.",
-    ("KIND", f"one of {', '.join(KINDS)}", KINDS),
+    ("KIND", f"one of {', '.join(SWEEPS)}", tuple(SWEEPS)),
     options.SOURCE,
     ("-o --output OUT", "contact sheet; default: SOURCE's name with -KIND.png in the current "
      "folder", options.path_ending_in(".png")),
@@ -52,10 +53,6 @@ _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_expos
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Evaluate all maps, compare, draw, and return the figures."""
-    from ..analysis.maps import LightDirection
-    from ..analysis.maps.picture import contact_sheet
-    from ..thesis.sweeps import sweep
-
     files = beside(".csv")
     output, numbers = files(output_of(args, Path(f"{args.source.stem}-{args.kind}.png"), files))
     light, values, gain = LightDirection(args.theta, args.phi), _values(args), gain_of(args)
@@ -64,9 +61,8 @@ def run(args: argparse.Namespace) -> Figures:
     if args.period is not None:
         settings["period"] = args.period
     if values is None and args.kind == "method" and gain is not None:
-        values = [name for name in options.METHODS if name != "rainbow"]
-    with Bar(args) as bar, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+        values = [name for name in NAMES if name != "rainbow"]
+    with Bar(args) as bar, warnings.catch_warnings(action="ignore", category=DiffractionWarning):
         result = sweep(
             args.kind, patch, light, values=values, method=args.method,
             gain=gain, resolution=args.resolution, samples=args.samples, progress=bar, **settings,
@@ -106,8 +102,6 @@ def _compiled(
 ) -> list[str]:
     if args.kind != "method" or not args.compiled:
         return []
-    from ..thesis.sweeps import time_compiled
-
     variant = set_variant(None)
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}
     resolution = 2 * args.resolution  # below it Python's share shows

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import counted
 from . import options
 from .console import Bar, mitsuba_warnings, say_warning
@@ -64,7 +66,13 @@ def run(args: argparse.Namespace) -> Figures:
         'value="vertex_orientation"/></texture> within the diffraction BSDF'
     )
     if report.breaks:
-        say_warning(f"the field {report.breaking()}: {_todo(args.along, report)}")
+        others = " or ".join(guide for guide in ("smooth", "body") if guide != args.along)
+        # triangles may be too large for the field's rotation
+        finer = "use a finer mesh, or " if report.turns_fast else ""
+        say_warning(
+            f"the field {report.breaking()}: colours will show seams there; {finer}choose another "
+            f"guide, --along {others}"
+        )
     elif report.turns_fast:
         say_warning(
             f"the field turns by over {BREAK:g} degrees within triangles on {report.turning:.0%} "
@@ -75,19 +83,8 @@ def run(args: argparse.Namespace) -> Figures:
             "singular": places, "tangents": report}  # fmt: skip
 
 
-def _todo(along: str, report: TangentReport) -> str:
-    """Return the remedy for a field that breaks."""
-    others = " or ".join(guide for guide in ("smooth", "body") if guide != along)
-    todo = f"choose another guide, --along {others}"
-    if report.turns_fast:  # triangles are too large for the field's rotation
-        todo = f"use a finer mesh, or {todo}"
-    return f"colours will show seams there; {todo}"
-
-
 def _places(places: object, indices: object, report: TangentReport) -> str:
     """Name the singular points in one line, or say that the field has none."""
-    import numpy as np
-
     points, turns = np.asarray(places), np.asarray(indices)
     if not len(points):
         if report.broken > 0:

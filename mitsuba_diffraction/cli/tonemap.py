@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..errors import DiffractionError
 from ..scene import set_variant
 from ..scene.pictures import read_exr, write_png
 from . import options
-from .report import Figures, default_output, output_of
+from .report import Figures, output_of
 
 
 @options.command(
@@ -23,7 +24,9 @@ from .report import Figures, default_output, output_of
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the PNG, which has no figures."""
-    output = output_of(args, default_output(args.picture, ".png"))
+    if not args.picture.name:
+        raise DiffractionError(f"'{args.picture}' is a folder; name a file in it")
+    output = output_of(args, args.picture.with_suffix(".png"))
     set_variant("scalar_rgb")  # bitmaps belong to no variant, but Mitsuba asks for one
     write_png(read_exr(args.picture), output, args.exposure, args.view)
     print(f"{output}: view {args.view}, {args.exposure:+g} stops")

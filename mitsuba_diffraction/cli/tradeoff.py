@@ -8,8 +8,23 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ..analysis.machine import describe_machine
+from ..analysis.timing import PIXEL
+from ..analysis.tradeoff import (
+    Budget,
+    measure,
+    measure_depths,
+    measure_wavelengths,
+    recommended,
+    settings,
+)
+from ..analysis.tradeoff.accuracy import Sample
+from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
 from ..errors import DiffractionWarning
+from ..heights import Source, gratings
+from ..heights.coherence import resolved_width
 from ..scene import set_variant
+from ..tables import DiffractionTable
 from . import options
 from .console import Bar
 from .options import number_between
@@ -45,21 +60,6 @@ def run(args: argparse.Namespace) -> Figures:
     if args.heights is None:
         options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
     args.output = output_of(args, Path("tradeoff"), _files_in, make_folder=True)
-    from ..analysis.machine import describe_machine
-    from ..analysis.timing import PIXEL
-    from ..analysis.tradeoff import (
-        Budget,
-        measure,
-        measure_depths,
-        measure_wavelengths,
-        recommended,
-        settings,
-    )
-    from ..analysis.tradeoff.accuracy import Sample
-    from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
-    from ..heights import Source, gratings
-    from ..heights.coherence import resolved_width
-
     side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
     if args.heights is None:
         field = gratings.elaphe_like(side * PIXEL, side)
@@ -67,8 +67,8 @@ def run(args: argparse.Namespace) -> Figures:
         field = Source.of(args.heights, options.load_options(args)).field()
     width = resolved_width(options.table_options(args).get("coherence_width", "auto"), [field])
     set_variant("llvm_ad_spectral")
-    with Bar(args) as bar, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)  # `info` has them
+    quiet = warnings.catch_warnings(action="ignore", category=DiffractionWarning)  # `info` has them
+    with Bar(args) as bar, quiet:
         results = measure(
             field,
             list(settings(args.quick)),
@@ -78,9 +78,10 @@ def run(args: argparse.Namespace) -> Figures:
             rounds=rounds,
             progress=bar,
         )
-        best = recommended(results, Budget(*_budget(args).values()))
-        from ..tables import DiffractionTable
-
+        budget = Budget(args.max_error, args.memory, args.time)
+        if budget == Budget():
+            budget = Budget(1e-3)
+        best = recommended(results, budget)
         finest = DiffractionTable.build(field, coherence_width=width, tolerance=1e-4)
         sample = Sample.draw(field, width, "ensemble", min(pairs, 160), bar)
         spectral = measure_wavelengths(finest, sample.wi, sample.wo)
@@ -94,13 +95,13 @@ def run(args: argparse.Namespace) -> Figures:
     document: dict[str, Any] = {
         "patch": title,
         "machine": describe_machine(),
-        "recommended": {"setting": best.setting.name, "budget": _budget(args)},
+        "recommended": {"setting": best.setting.name, "budget": asdict(budget)},
         "spectral": asdict(spectral),
     }
     document |= plain(results, deep)
     save_json(args.output / "tradeoff.json", document)
     save_csv(args.output / "tradeoff.csv", document["settings"])
-    print("\n".join(lines(results, spectral, best, _budget(args))))
+    print("\n".join(lines(results, spectral, best, budget)))
     print(f"wrote {args.output / 'tradeoff'}.json, .csv, .png and depth.png")
     return document
 
@@ -108,11 +109,3 @@ def run(args: argparse.Namespace) -> Figures:
 def _files_in(folder: Path) -> list[Path]:
     names = ("tradeoff.json", "tradeoff.csv", "tradeoff.png", "depth.png")
     return [folder / name for name in names]
-
-
-def _budget(args: argparse.Namespace) -> dict[str, float | None]:
-    """Limits of the recommended setting; by default, an error of 1e-3."""
-    budget = {"tolerance": args.max_error, "megabytes": args.memory, "relative": args.time}
-    if all(value is None for value in budget.values()):
-        budget["tolerance"] = 1e-3
-    return budget

@@ -7,22 +7,16 @@ import contextlib
 import importlib.util
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ..cluster import FrameRequest, FrameSequence, connect
+from ..cluster.workers import VARIABLE, check_workers, executor_of
 from ..errors import counted
 from ..system import cores
 from .console import Bar, say, say_warning
 from .options import Group, refuse, whole_number
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
-    from ..cluster import FrameRequest, FrameSequence
-
-#: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.
-VARIABLE = "DASK_SCHEDULER_ADDRESS"
-
 
 #: Options that choose workers.
 WORKERS = Group("workers (extra `cluster`)", (
@@ -57,8 +51,6 @@ def worker_threads(args: argparse.Namespace) -> int:
 @contextlib.contextmanager
 def client_of(args: argparse.Namespace) -> Iterator[Any]:
     """Connect to the requested workers, and print the address of their pages."""
-    from ..cluster import connect
-
     has_page = importlib.util.find_spec("bokeh") is not None
     with connect(args.workers, args.scheduler) as client:
         if not args.workers or has_page:
@@ -70,8 +62,6 @@ def film_of(
     args: argparse.Namespace, client: Any, frames: Sequence[FrameRequest], variant: str, keep: Path
 ) -> FrameSequence:
     """Return the renderer of the command's frames on workers."""
-    from ..cluster import FrameSequence
-
     with Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         film = FrameSequence(
@@ -115,8 +105,6 @@ def executor_for(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
     """Yield the processes that solve, and their number."""
     if on_workers(args):
         refuse(args, ["jobs"], ": is for this machine; --workers has its own")
-        from ..cluster.workers import check_workers, executor_of
-
         with client_of(args) as client:
             count = len(check_workers(client, None))
             with executor_of(client) as workers:

@@ -77,9 +77,9 @@ def render(
             keep=Path(keep or Path(temporary) / "passes"), warn=warn, sensor=sensor,
             preview=preview, threads=threads,
         )  # fmt: skip
-        for result in film.render(stop, progress):
-            film.forget(0)
-            return result
+        results = list(film.render(stop, progress))
+    if results:
+        return results[0]
     raise DiffractionError("interrupted: finished passes are kept where `keep` says")
 
 
@@ -159,6 +159,8 @@ class FrameSequence:
     def render(self, stop: Stop, progress: Progress) -> Iterator[Result]:
         """Yield frame after frame; end early once asked to stop.
 
+        The stored sums of a frame are removed when the next is asked for: its picture is written.
+
         Raises a DiffractionError that names frame, passes and worker, if a task fails; finished
         work is stored.
         """
@@ -174,6 +176,7 @@ class FrameSequence:
                 self.report.where.update(total.where)
                 self.report.seconds = time.perf_counter() - start
                 yield Result(picture, spp, stop.asked)
+                self._kept.forget(frame)
                 if stop.asked:
                     return
         except Stopped:
@@ -187,7 +190,3 @@ class FrameSequence:
                     "sums of different processors or numbers of threads were mixed, and may "
                     f"differ in their last bits: {'; '.join(sorted(self.report.where))}"
                 )
-
-    def forget(self, frame: int) -> None:
-        """Remove the stored sums of a frame."""
-        self._kept.forget(self.frames[frame])

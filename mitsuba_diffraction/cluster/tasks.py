@@ -20,6 +20,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
@@ -131,8 +132,8 @@ def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums:
     """
     with failures():
         task.files.require(contents or {})
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
+        # the client has loaded the scene, and said them
+        with warnings.catch_warnings(action="ignore"):
             return _sums(task)
 
 
@@ -159,8 +160,6 @@ def failures() -> Iterator[None]:
 
 
 def _sums(task: Task) -> Sums:
-    import drjit as dr
-
     start = time.perf_counter()
     check_versions(task.versions)
     threads = task.threads or cores()

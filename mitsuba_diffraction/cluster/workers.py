@@ -14,6 +14,7 @@ from typing import Any
 
 from ..errors import DiffractionError, one_line
 from ..extras import optional
+from ..scene import set_variant
 from ..scene.passes import Stop
 from .tasks import Failed, MissingFiles, check_versions, versions
 
@@ -213,8 +214,6 @@ def memory_warnings(client: Any, needed: float) -> Iterator[str]:
 
 def trouble_of_process(wanted: tuple[str, ...], variant: str | None) -> str | None:
     """Return the reason why this process cannot serve, or None."""
-    from ..scene import set_variant
-
     try:
         check_versions(wanted)
         if variant is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.analysis.scans import bsdf_of
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.tables import DiffractionTable
+from tests.support.lanes import interaction, vectors
 
 LIGHT = LightDirection(30.0, 0.0)
 
@@ -105,12 +105,8 @@ def test_a_material_s_factor_is_the_plugin_s_at_any_azimuth(variant, surface):
     radius, angle = np.sqrt(generator.random(200)) * 0.98, generator.uniform(0.0, 2 * np.pi, 200)
     sines = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
     value, w = MaterialFactor.of(bsdf, 35.0).at(light)(sines, 505.0)
-    si = dr.zeros(mi.SurfaceInteraction3f, 200)
-    si.n = mi.Normal3f(0, 0, 1)
-    si.sh_frame = mi.Frame3f(si.n)
-    si.wi = mi.Vector3f(light.direction.tolist())
-    si.wavelengths = mi.UnpolarizedSpectrum(505.0)
-    wo = mi.Vector3f(*sines.T, np.sqrt(1.0 - radius**2))
+    si = interaction(np.tile(light.direction, (200, 1)), 505.0)
+    wo = vectors(np.column_stack([sines, np.sqrt(1.0 - radius**2)]))
     site = bsdf.site_at(si, mi.Mask(True))
     expected, expected_w = bsdf.material_factor(bsdf.pair(site, wo, mi.Mask(True)), site)
     # linear between directions one and five degrees apart

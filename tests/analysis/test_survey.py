@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import re
-import signal
-import time
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,6 @@ from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
-from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
 from tests.support.directions import rough_patch
 
@@ -185,25 +182,6 @@ def test_samples_have_means_and_standard_errors(tmp_path):
         assert [row["sample"] for row in csv.DictReader(file)] == ["a", "b"]
 
 
-def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path):
-    # a window of 20 µm sees one part of a scale, whose index is 0.085 to 0.111: a mean of two
-    scale = gratings.elaphe_like(20.0, 160).heights
-    patches = [np.zeros((160, 160)), gratings.cd(20.0, 160).heights]
-    patches += [np.roll(scale, (n, n), (0, 1)) for n in (0, 80)]
-    files = [tmp_path / f"{n}.npy" for n in range(len(patches))]
-    for file, heights in zip(files, patches, strict=True):
-        np.save(file, heights)
-    options = load_treatments(_toml(tmp_path, '["*.npy"]\npixel_size = 0.125\n'))
-    rows = run_survey(
-        files, tmp_path / "out", treatments=options,
-        common=Treatment(settings={"coherence_width": 20.0, "tolerance": 0.05}), resolution=32,
-    )  # fmt: skip
-    assert [row["reason"] for row in rows] == [""] * 4
-    mirror, disc, *scales = (row["iridescence"] for row in rows)
-    assert mirror == 0.0
-    assert 0.02 < np.mean(scales) < disc
-
-
 def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
     said = []
 
@@ -218,24 +196,6 @@ def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
         rows = list(csv.DictReader(file))
     assert [Path(row["file"]).stem for row in rows] == ["straight"]
     assert said == ["straight.npy", "broken.npy"]
-
-
-def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, capfd):
-    def measure(job):
-        signal.raise_signal(signal.SIGINT)
-        time.sleep(60)
-
-    monkeypatch.setattr(module, "measure", measure)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    start = time.perf_counter()
-    try:
-        code = main(["survey", *map(str, scans), "--pixel-size", "0.1", "-o", str(tmp_path / "a")])
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert code == 130
-    assert time.perf_counter() - start < 30  # far from the minute that the scan would take
-    (line,) = capfd.readouterr().err.splitlines()
-    assert "run the command again to go on" in line
 
 
 def test_rows_are_ranked_by_light_beyond_chance_and_failed_ones_last():

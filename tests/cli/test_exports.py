@@ -42,8 +42,7 @@ def pixels(file: Path) -> np.ndarray:
 def test_a_shader_is_written_with_all_that_it_reads(run, plate):
     out = Path("shaders/grating")
     ran = run("export-shader", "grating.toml", "-o", out, "--method", "fast", "--int-ior", "1.5",
-              "--coherence-width", "4", "--json", "report.json")  # fmt: skip
-    assert ran.code == 0, ran.err
+              "--coherence-width", "4", "--json", "report.json").succeeded()  # fmt: skip
     assert f"{out}: diffraction: " in ran.out
     constants = json.loads((out / "constants.json").read_text(encoding="utf-8"))
     code = (out / "diffraction.glsl").read_text(encoding="utf-8")
@@ -64,8 +63,9 @@ def test_a_shader_is_written_with_all_that_it_reads(run, plate):
 
 def test_a_material_for_blender_is_written_with_all_that_it_reads(run, orders):
     out = Path("blender/grating")
-    ran = run("export-osl", orders, "-o", out, "--orientation", "90", "--json", "report.json")
-    assert ran.code == 0, ran.err
+    ran = run(
+        "export-osl", orders, "-o", out, "--orientation", "90", "--json", "report.json"
+    ).succeeded()
     shader = out / "diffraction_my_grating.osl"
     assert ran.out.startswith(f"{shader}: ")
     document = json.loads(shader.with_suffix(".json").read_text(encoding="utf-8"))
@@ -86,16 +86,14 @@ def test_a_bad_name_is_refused_before_anything_is_made(run, orders):
 
 def test_an_addon_holds_the_folders_that_are_named(run, orders):
     assert run("export-osl", orders, "-o", "grating-osl").code == 0
-    ran = run("export-osl", "--addon", "looks.zip", "--with", "grating-osl")
-    assert ran.code == 0, ran.err
+    ran = run("export-osl", "--addon", "looks.zip", "--with", "grating-osl").succeeded()
     assert ran.out.startswith("looks.zip: grating: ")
 
 
 def test_a_page_is_written_with_its_title_as_text_and_its_loss_is_named(run, plate):
     plate.rename("<!--<script>.xml")
     ran = run("export-viewer", "<!--<script>.xml", "-o", "plate.html", "--method", "fast",
-              "--json", "page.json")  # fmt: skip
-    assert ran.code == 0, ran.err
+              "--json", "page.json").succeeded()  # fmt: skip
     page = Path("plate.html")
     report = json.loads(Path("page.json").read_text(encoding="utf-8"))
     assert report["bytes"] == page.stat().st_size
@@ -143,8 +141,7 @@ def test_without_a_browser_the_address_is_said(run, plate, opened, monkeypatch):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setattr("tempfile.tempdir", str(plate.parent))
-    ran = run("view", plate, "--method", "exact")
-    assert ran.code == 0, ran.err
+    ran = run("view", plate, "--method", "exact").succeeded()
     (page,) = plate.parent.glob("mitsuba-diffraction-*/plate.html")
     assert page.as_uri() in ran.out
     assert opened == []
@@ -168,7 +165,6 @@ def test_a_card_is_a_folder_that_needs_no_other_file(run, logo):
 
 def test_a_label_lies_on_the_front_of_a_mesh(run, logo):
     write_board(Path("board.obj"))
-    ran = run("hologram", logo, "--mesh", "board.obj", "--up", "z", "-o", "a/b")
-    assert ran.code == 0, ran.err
+    run("hologram", logo, "--mesh", "board.obj", "--up", "z", "-o", "a/b").succeeded()
     assert 'type="fitted_mesh"' in Path("a/b/label.xml").read_text()
     assert Path("a/b/board.obj").read_bytes() == Path("board.obj").read_bytes()

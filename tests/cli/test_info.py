@@ -20,8 +20,7 @@ def table(heights, tmp_path):
 
 
 def test_a_height_field_is_described(run, heights):
-    ran = run("info", heights, "--pixel-size", "0.08")
-    assert ran.code == 0
+    ran = run("info", heights, "--pixel-size", "0.08").succeeded()
     for part in ("height field", "75 x 75", "6 x 6 µm", "rms slope", "history", "warnings"):
         assert part in ran.out
 
@@ -142,8 +141,7 @@ def test_normals_of_an_obj_are_those_of_the_file(run, tmp_path, own):
 
 def test_the_albedo_is_plotted(run, table, tmp_path):
     picture = tmp_path / "albedo.png"
-    ran = run("info", table, "--albedo", picture)
-    assert ran.code == 0
+    ran = run("info", table, "--albedo", picture).succeeded()
     assert str(picture) in ran.out
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -152,8 +150,7 @@ def test_the_albedo_is_plotted(run, table, tmp_path):
 def test_heights_are_drawn(run, heights, tmp_path, depth):
     np.save(heights, depth * np.load(heights))
     picture = tmp_path / "heights.png"
-    ran = run("info", heights, "--pixel-size", "0.08", "--picture", picture)
-    assert ran.code == 0
+    ran = run("info", heights, "--pixel-size", "0.08", "--picture", picture).succeeded()
     assert f"picture: {picture}" in " ".join(ran.out.split())
     with Image.open(picture) as image:
         assert image.width > 3 * image.height  # a row of panels
@@ -196,8 +193,7 @@ def test_a_question_about_units_is_asked_once(run, here):
 
 
 def test_formats_are_listed_with_what_to_export_for_others(run):
-    ran = run("info", "--formats")
-    assert ran.code == 0
+    ran = run("info", "--formats").succeeded()
     assert "NanoScope (.spm" in ran.out
     data = json.loads(run("info", "--formats", "--json").out)
     for row in data["not read"]:

@@ -47,8 +47,7 @@ def test_help_names_every_command_which_has_help(run):
     assert overview.code == 0
     for name in ("precompute", "info", "render"):
         assert name in overview.out
-        ran = run(name, "--help")
-        assert ran.code == 0
+        ran = run(name, "--help").succeeded()
         assert "--debug" in ran.out
 
 
@@ -149,8 +148,7 @@ def test_a_warning_is_one_line_and_said_once(run, command):
             warnings.warn("steep\n  slopes", DiffractionWarning, stacklevel=1)
         warnings.warn("coarse pixels", DiffractionWarning, stacklevel=1)
 
-    ran = run(*command(action))
-    assert ran.code == 0
+    ran = run(*command(action)).succeeded()
     assert ran.err.splitlines() == [
         "mitsuba-diffraction: warning: steep slopes",
         "mitsuba-diffraction: warning: coarse pixels",
@@ -166,19 +164,24 @@ def test_samples_below_zero_are_said_once_whatever_they_are(run, command):
             for value in (-0.1, -0.2, -0.3):
                 mi.Log(mi.LogLevel.Warn, f"Invalid sample value: [{value}, 0, 0, 1]")
 
-    ran = run(*command(action))
-    assert ran.code == 0
+    ran = run(*command(action)).succeeded()
     (line,) = ran.err.splitlines()
     assert line.startswith("mitsuba-diffraction: warning: some samples are below zero")
 
 
+def in_bash(line, folder, file, *options):
+    """Run a line of bash in a folder, whose {} is `info` of a file with options."""
+    words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(file), *options]
+    return subprocess.run(
+        ["bash", "-c", line.format(shlex.join(words))],
+        capture_output=True, text=True, timeout=120, cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+
+
 @posix
-def test_a_closed_pipe_is_no_traceback(heights):
-    words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
-    command = shlex.join([*words, "--pixel-size", "0.1", "--json"])
-    ran = subprocess.run(
-        ["bash", "-c", f"{command} | true"], capture_output=True, text=True, timeout=120
-    )
+def test_a_closed_pipe_is_no_traceback(heights, here):
+    ran = in_bash("{} | true", here, heights, "--pixel-size", "0.1", "--json")
     assert ran.stderr == ""
 
 
@@ -202,8 +205,7 @@ def test_names_do_not_control_the_terminal(run, here, heights, stream):
     hostile = here / "a\x1b]0;b\x07\u202ec.npy"
     hostile.write_bytes(heights.read_bytes())
     options = ["--json"] if stream == "--json" else []
-    ran = run("info", hostile, "--pixel-size", "0.08", *options)
-    assert ran.code == 0
+    ran = run("info", hostile, "--pixel-size", "0.08", *options).succeeded()
     assert ran.out.isprintable() or not {"\x1b", "\x07", "\u202e"} & set(ran.out)
     if options:
         assert json.loads(ran.out)["file"] == str(hostile)
@@ -216,11 +218,7 @@ def test_names_do_not_control_the_terminal(run, here, heights, stream):
 def test_a_deleted_working_folder_is_one_line(heights, tmp_path):
     gone = tmp_path / "gone"
     gone.mkdir()
-    words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
-    ran = subprocess.run(
-        ["bash", "-c", f"cd '{gone}' && rmdir '{gone}' && {shlex.join(words)}"],
-        capture_output=True, text=True, timeout=120, env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    ran = in_bash(f"rmdir '{gone}' && {{}}", gone, heights)
     assert ran.returncode == 1
     (line,) = ran.stderr.splitlines()
     assert "current folder does not exist" in line
@@ -229,12 +227,7 @@ def test_a_deleted_working_folder_is_one_line(heights, tmp_path):
 @posix
 @pytest.mark.parametrize("closed", [">&-", ">&- 2>&- <&-"])
 def test_closed_streams_are_no_error(heights, closed, tmp_path):
-    words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
-    command = f"{shlex.join([*words, '--pixel-size', '0.08', '--json', 'a.json'])} {closed}"
-    ran = subprocess.run(
-        ["bash", "-c", command], capture_output=True, text=True, timeout=120, cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    ran = in_bash(f"{{}} {closed}", tmp_path, heights, "--pixel-size", "0.08", "--json", "a.json")
     assert ran.returncode == 0
     assert "Traceback" not in ran.stderr
     assert json.loads((tmp_path / "a.json").read_text("utf-8"))["kind"] == "height field"

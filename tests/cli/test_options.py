@@ -7,7 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction.cli.options import add_options, given, option_of, refuse, whole_number
+from mitsuba_diffraction.cli.options import (
+    add_options,
+    given,
+    limits,
+    option_of,
+    refuse,
+    whole_number,
+)
 from mitsuba_diffraction.cli.spellings import current
 
 
@@ -19,7 +26,7 @@ def parser() -> argparse.ArgumentParser:
         parser,
         ("FILE ...", "what is read", Path, None, {"dest": "files"}),
         ("-s --spp N", "samples", whole_number(1), 64),
-        ("--range LOW HIGH", "nm; default: all", float),
+        ("--range FIRST:LAST", "nm; default: all", limits),
         ("--kind", "which", ("a", "b"), "a"),
         ("--thin", "a sheet", bool),
         ("--layer M:T", "film; may be given several times", [str], None, {"dest": "layers"}),
@@ -34,9 +41,9 @@ def test_rows_say_type_number_and_default_of_values(parser):
     assert args.files == [Path("a"), Path("b")]
     assert (args.spp, args.range, args.kind, args.thin, args.layers) == (64, None, "a", False, [])
     args = parser.parse_args(
-        ["a", "-s2", "--range", "1", "2", "--kind=b", "--thin", "--layer=x", "--layer=y"]
+        ["a", "-s2", "--range", "1:2", "--kind=b", "--thin", "--layer=x", "--layer=y"]
     )
-    assert (args.spp, args.range, args.kind) == (2, [1.0, 2.0], "b")
+    assert (args.spp, args.range, args.kind) == (2, (1.0, 2.0), "b")
     assert (args.thin, args.layers) == (True, ["x", "y"])
 
 
@@ -50,9 +57,9 @@ def test_defaults_are_told_once(parser):
 
 
 def test_options_are_refused_by_their_own_names(parser, capsys):
-    args = parser.parse_args(["a", "--layer", "x", "--range", "0", "0"])
+    args = parser.parse_args(["a", "--layer", "x", "--range", "0:0"])
     names = ("thin", "layers", "range")
-    assert given(args, (*names, "missing")) == {"layers": ["x"], "range": [0.0, 0.0]}
+    assert given(args, (*names, "missing")) == {"layers": ["x"], "range": (0.0, 0.0)}
     assert option_of(args, "spp") == "--spp"
     refuse(args, ["thin"], ": not here")
     with pytest.raises(SystemExit):

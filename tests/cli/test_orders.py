@@ -12,8 +12,8 @@ from tests.support import crossed
 from tests.support.orders import thin_grating
 
 
-def test_info_describes_a_table_of_orders(run, tmp_path):
-    path = tmp_path / "grating.nc"
+def test_info_describes_a_table_of_orders(run, here):
+    path = here / "grating.nc"
     thin_grating(0.6, counts=(2, 2, 1)).save(path)
     data = json.loads(run("info", path, "--json").out)
     assert (data["kind"], data["period_um"]) == ("table of orders", 0.6)
@@ -21,19 +21,17 @@ def test_info_describes_a_table_of_orders(run, tmp_path):
     assert run("info", path, "--level", "plane").code != 0
 
 
-def test_maps_show_a_table_of_orders(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    thin_grating(0.6, counts=(2, 2, 1)).save(tmp_path / "grating.nc")
+def test_maps_show_a_table_of_orders(run, here):
+    thin_grating(0.6, counts=(2, 2, 1)).save(here / "grating.nc")
     flags = ("--resolution", 16, "--samples", 1, "--wavelength", 550)
     assert run("brdf-map", "grating.nc", *flags).code == 0
-    assert (tmp_path / "grating-map.exr").is_file()
+    assert (here / "grating-map.exr").is_file()
     refused = run("brdf-map", "grating.nc", "--material", "Al", *flags)
     assert refused.code != 0
     assert "'material' is a parameter of the plugin 'diffraction'" in refused.err
 
 
-def test_orders_are_listed_as_import_reads_them(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_orders_are_listed_as_import_reads_them(run, here):
     thin_grating(0.6, counts=(2, 2, 1), wavelengths=(500.0, 640.0)).save("grating.nc")
     assert run("orders", "grating.nc", "--theta=-80:80:10", "--step", 70).code == 0
     flags = ("--import", "--period", 0.6, "-o", "back.nc")
@@ -42,11 +40,10 @@ def test_orders_are_listed_as_import_reads_them(run, tmp_path, monkeypatch):
     assert "500 to 640 nm" in run("orders", "grating.nc", "--wavelength", "450").err
 
 
-def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_spectra_of_a_table_of_orders_end_where_it_ends(run, here):
     thin_grating(0.6, counts=(2, 2, 1), wavelengths=(420.0, 680.0)).save("grating.nc")
     assert run("spectrum", "grating.nc", "--step", 40, "--relative", "none").code == 0
-    lines = (tmp_path / "grating-spectrum.csv").read_text().split()
+    lines = (here / "grating-spectrum.csv").read_text().split()
     first, last = (float(lines[n].partition(",")[0]) for n in (1, -1))
     assert 420 <= first < last <= 680
     for wanted in ("300:900", "300:400"):
@@ -54,33 +51,30 @@ def test_spectra_of_a_table_of_orders_end_where_it_ends(run, tmp_path, monkeypat
         assert "420 to 680 nm" in refused.failed_in_one_line()
 
 
-def test_a_brdf_is_written_for_other_programs(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_brdf_is_written_for_other_programs(run, here):
     thin_grating(0.6, counts=(2, 2, 1)).save("grating.nc")
     grid = ("--theta", "0,40", "--phi", 0, "--wavelength", 550, "--resolution", 8)
     assert run("export-bsdf", "grating.nc", *grid, "--format", "zemax").code == 0
     assert run("export-bsdf", "grating.nc", *grid, "-o", "grating.brdf").code == 0
     assert run("export-bsdf", "grating.nc", *grid, "-o", "grating.csv").code == 0
-    assert (tmp_path / "grating.csv").read_text().startswith("theta_i_deg,")
-    assert (tmp_path / "grating.bsdf").read_text("ascii").endswith("DataEnd\n")
-    assert json.loads((tmp_path / "grating.brdf").read_text())["metadata"]["type"] == "BRDF"
+    assert (here / "grating.csv").read_text().startswith("theta_i_deg,")
+    assert (here / "grating.bsdf").read_text("ascii").endswith("DataEnd\n")
+    assert json.loads((here / "grating.brdf").read_text())["metadata"]["type"] == "BRDF"
     dark = run("export-bsdf", "grating.nc", *grid[:4], "--wavelength", "550,900", "-o", "dark.csv")
     assert "380 to 780 nm" in dark.err
-    assert not (tmp_path / "dark.csv").exists()
+    assert not (here / "dark.csv").exists()
     refused = run("export-bsdf", "grating.nc", "--format", "bird", "-o", "x.bsdf")
     assert ".json or .brdf" in refused.err
     assert "no heights" in run("evaluate", "grating.nc").err
 
 
-def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_block_is_solved_and_other_programs_refuse_it(run, here, monkeypatch):
     # a process takes a second to start
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.accuracy.SAMPLES", 16)
     grating = ("--period", 0.3, "--depth", 0.01, "--material", 1.5, "--wavelength-range", "540:560")
     settings = ("--tolerance", 0.2, "--resolution", 3, "-o", "block.nc")
-    ran = run("solve", "lamellar", *grating, "--block", *settings)
-    assert ran.code == 0, ran.err
+    ran = run("solve", "lamellar", *grating, "--block", *settings).succeeded()
     assert "index 1.5" in ran.out
     assert json.loads(run("info", "block.nc", "--json").out)["block_index"] == 1.5
     assert run("orders", "block.nc").code == 0
@@ -90,8 +84,7 @@ def test_a_block_is_solved_and_other_programs_refuse_it(run, tmp_path, monkeypat
     assert "--import" in run("solve", "a.csv", "--import", "--period", 1, "--block").err
 
 
-def test_crossed_gratings_are_listed_imported_and_measured(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_crossed_gratings_are_listed_imported_and_measured(run, here):
     crossed.table().save("crossed.nc")
     data = json.loads(run("info", "crossed.nc", "--json").out)
     assert data["periods_um"] == list(crossed.PERIODS)
@@ -109,8 +102,7 @@ def test_crossed_gratings_are_listed_imported_and_measured(run, tmp_path, monkey
         assert "crossed grating" in run(command, "back.nc").err
 
 
-def test_a_crossed_grating_is_solved(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_crossed_grating_is_solved(run, here):
     np.save("flat.npy", np.zeros((4, 4)))
     flags = ("--crossed", "--period", 0.2, "--wavelength-range", "500:500", "--resolution", 3)
     light = ("--theta", "0,60", "--polarised")

@@ -69,8 +69,7 @@ def test_a_given_output_over_an_input_is_refused_before_the_work(run, world, com
 def test_a_default_output_over_an_input_gets_another_name_in_one_line(run, world):
     """The scene reads scale.png, which is where its picture would go."""
     before = _contents(world)
-    ran = run(*shlex.split(RENDER))
-    assert ran.code == 0, ran.err
+    ran = run(*shlex.split(RENDER)).succeeded()
     said = [line for line in ran.err.splitlines() if "reads" in line]
     assert said == [
         "mitsuba-diffraction: this command reads 'scale.png', so its output is called 'scale-2.exr'"
@@ -97,8 +96,7 @@ def test_a_survey_goes_on_in_its_folder_that_the_shell_names_among_the_scans(run
     """As `survey *` does the second time."""
     for _ in range(2):
         names = [name for name in sorted(os.listdir()) if name in ("h.npy", "survey")]
-        ran = run("survey", *names, *shlex.split(HEIGHTS), "--resolution", "8")
-        assert ran.code == 0, ran.err
+        ran = run("survey", *names, *shlex.split(HEIGHTS), "--resolution", "8").succeeded()
     assert "survey/survey.csv" in ran.err
 
 

@@ -137,8 +137,7 @@ def test_a_page_shows_what_is_needed(planned, tmp_path):
 def test_a_plan_is_made_before_rendering(run, folder, planned):
     _, report = planned
     out = folder / "made.exr"
-    ran = run("render", folder / "foil.xml", "-s", 4, "-o", out, "--plan", *PATHS)
-    assert ran.code == 0
+    ran = run("render", folder / "foil.xml", "-s", 4, "-o", out, "--plan", *PATHS).succeeded()
     now, before = (report["tables"][0][which]["memory_mb"] for which in ("planned", "whole"))
     assert f"plan: foil has a table of {now:.3g} MB instead of {before:.3g} MB" in ran.err
 
@@ -148,7 +147,6 @@ def test_variants_without_wavelengths_say_so_and_render(run, folder, planned):
     out = folder / "mono.exr"
     ran = run(
         "render", folder / "foil.xml", "-m", "llvm_ad_mono", "-s", 1, "-o", out, "--plan", plan
-    )
-    assert ran.code == 0
+    ).succeeded()
     assert "warning: --plan: llvm_ad_mono looks up" in ran.err
     assert run("plan", folder / "foil.xml", "-m", "llvm_ad_mono").code == 1

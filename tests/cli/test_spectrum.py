@@ -33,9 +33,8 @@ def read(path):
 
 
 def test_a_csv_and_a_picture_are_written_and_named(run, scans, here):
-    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, "--light", "20", "--detector", "20",
-              "0", "--json", "s.json")  # fmt: skip
-    assert ran.code == 0, ran.err
+    run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, "--light", "20", "--detector", "20",
+        "0", "--json", "s.json").succeeded()  # fmt: skip
     assert {"scan0-spectrum.csv", "scan0-spectrum.png"} <= set(os.listdir(here))
     rows = read("scan0-spectrum.csv")
     assert rows["wl"].tolist() == [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0]
@@ -48,19 +47,17 @@ def test_a_csv_and_a_picture_are_written_and_named(run, scans, here):
 
 
 def test_a_single_wavelength_is_measured_of_heights_too(run, scans):
-    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK[:2], "--wavelength-range", "633:633",
-              "-o", "one.csv")  # fmt: skip
-    assert ran.code == 0, ran.err
+    run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK[:2], "--wavelength-range", "633:633",
+        "-o", "one.csv").succeeded()  # fmt: skip
     assert read("one.csv")["wl"].tolist() == 633.0
 
 
 @pytest.mark.parametrize("asked", [("--height-scale", "2"), ("--coat-ior", "1.6")])
 def test_the_table_serves_the_heights_that_are_asked_for(run, scans, asked):
-    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, *asked, "-o", "scaled.csv")
-    assert ran.code == 0, ran.err
+    run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, *asked, "-o", "scaled.csv").succeeded()
     twice = gratings.sinusoidal(period=1.6, depth=0.06, periods=5, rows=20).heights
     np.save(scans / "twice.npy", twice)
-    ran = run("spectrum", scans / "twice.npy", *PIXEL, *QUICK, "-o", "twice.csv")
+    run("spectrum", scans / "twice.npy", *PIXEL, *QUICK, "-o", "twice.csv")
     agrees = read("scaled.csv")["light30_detector30"] == pytest.approx(
         read("twice.csv")["light30_detector30"], rel=0.01
     )
@@ -71,8 +68,7 @@ def test_the_table_serves_the_heights_that_are_asked_for(run, scans, asked):
 def test_wavelengths_that_a_table_lacks_are_refused_if_they_were_asked_for(run, world, file):
     """Of the default range they are left out, in one line: of both kinds of tables."""
     how = ["--light", "10", "--detector", "0", "--step", "50", "-o", "out.csv"]
-    ran = run("spectrum", file, *how)
-    assert ran.code == 0, ran.err
+    ran = run("spectrum", file, *how).succeeded()
     assert ran.err.count(": other wavelengths are left out") == 1
     (world / "out.csv").unlink()
     line = run("spectrum", file, *how, "--wavelength-range", "310:650").failed_in_one_line()
@@ -91,8 +87,7 @@ def test_wavelengths_that_a_table_lacks_are_refused_if_they_were_asked_for(run, 
 def test_scans_without_colours_and_in_other_units_are_said_in_full(run, here, heights, pixel, said):
     """Not as one of some notes that `info` prints."""
     np.save(here / "a.npy", heights)
-    ran = run("spectrum", "a.npy", "--pixel-size", pixel, "--step", "200")
-    assert ran.code == 0, ran.err
+    ran = run("spectrum", "a.npy", "--pixel-size", pixel, "--step", "200").succeeded()
     assert said in ran.err
 
 
@@ -107,8 +102,9 @@ def test_results_of_an_earlier_run_beside_the_scans_are_left_out(
     results = sorted(name for name in os.listdir() if not name.endswith(".npy"))
     assert len(results) == 9, results
     for n, names in enumerate([sorted(os.listdir()), ["."]]):
-        ran = run(command, *names, *PIXEL, *QUICK[:2], "-o", scans.parent / f"{n}{suffix}")
-        assert ran.code == 0, ran.err
+        ran = run(
+            command, *names, *PIXEL, *QUICK[:2], "-o", scans.parent / f"{n}{suffix}"
+        ).succeeded()
         assert all(name in ran.err for name in results)
     ran = run(command, *results[:2], *PIXEL, "-o", scans.parent / f"b{suffix}")
     line = ran.failed_in_one_line()
@@ -116,10 +112,8 @@ def test_results_of_an_earlier_run_beside_the_scans_are_left_out(
 
 
 def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
-    ran = run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv")
-    assert ran.code == 0, ran.err
-    ran = run("spectrum", scans / "*.npy", *PIXEL, *QUICK, "-o", "pattern.csv")
-    assert ran.code == 0, ran.err
+    run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv").succeeded()
+    run("spectrum", scans / "*.npy", *PIXEL, *QUICK, "-o", "pattern.csv").succeeded()
     assert (here / "folder.csv").read_bytes() == (here / "pattern.csv").read_bytes()
     assert (read("folder-errors.csv")["light30_detector30"] > 0.0).all()
 
@@ -142,10 +136,9 @@ def test_groups_have_columns_errors_colours_and_variables_each(run, scans, here,
     for name in ("LAMPS", "DETECTORS"):
         monkeypatch.setattr(angular_variables, name, getattr(angular_variables, name)[::4])
     (here / "t.toml").write_text(f'["*.npy"]\npixel_size = {PIXEL[1]}\n')
-    ran = run("spectrum", "--group", f"a b={scans / 'scan0.npy'}", "--group", f"both={scans}",
-              "--treatments", "t.toml", *QUICK, "--detector", "-20:20:20",
-              "--iridescence", "-o", "g.csv")  # fmt: skip
-    assert ran.code == 0, ran.err
+    run("spectrum", "--group", f"a b={scans / 'scan0.npy'}", "--group", f"both={scans}",
+        "--treatments", "t.toml", *QUICK, "--detector", "-20:20:20",
+        "--iridescence", "-o", "g.csv").succeeded()  # fmt: skip
     names = read("g.csv").dtype.names
     angles = ("m20", "0", "20")
     expected = [f"{name}_light30_detector{a}" for name in ("a_b", "both") for a in angles]
@@ -162,29 +155,25 @@ def test_groups_have_columns_errors_colours_and_variables_each(run, scans, here,
 
 def test_crops_of_a_scan_have_errors_and_auto_turns_the_lamp(run, scans, here):
     ran = run("spectrum", scans / "scan0.npy", "--pixel-size", "0.05", *QUICK, "--azimuth", "auto",
-              "--detector", "0", "-o", "c.csv", "--light", "20")  # fmt: skip
-    assert ran.code == 0, ran.err
+              "--detector", "0", "-o", "c.csv", "--light", "20").succeeded()  # fmt: skip
     assert "azimuth across 1.6 µm along 0°" in ran.err
     field = gratings.sinusoidal(period=1.6, depth=0.03, periods=40, rows=64)
     np.save(here / "wide.npy", np.tile(field.heights[:64, :128], (1, 1)))
-    ran = run("spectrum", "wide.npy", *PIXEL, *QUICK, "--crops", "2", "-o", "c.csv")
-    assert ran.code == 0, ran.err
+    run("spectrum", "wide.npy", *PIXEL, *QUICK, "--crops", "2", "-o", "c.csv").succeeded()
     assert "c-errors.csv" in os.listdir(here)
 
 
 def test_notes_on_many_scans_are_one_scan_s_and_a_number(run, scans, here):
     for n in range(2):
         np.save(scans / f"scan{n}.npy", 2.5 * np.load(scans / f"scan{n}.npy"))
-    ran = run("spectrum", scans, *PIXEL, *QUICK)
-    assert ran.code == 0, ran.err
+    ran = run("spectrum", scans, *PIXEL, *QUICK).succeeded()
     assert sum("info " in line for line in ran.err.splitlines()) == 1
     assert "1 more scan" in ran.err
 
 
 def test_samples_that_are_averaged_are_said(run, scans, here):
     (scans / "scan1.npy").rename(scans / "other1.npy")
-    ran = run("spectrum", scans, *PIXEL, *QUICK)
-    assert ran.code == 0, ran.err
+    ran = run("spectrum", scans, *PIXEL, *QUICK).succeeded()
     assert "2 names" in ran.err
     assert "--group" in ran.err
 
@@ -192,8 +181,7 @@ def test_samples_that_are_averaged_are_said(run, scans, here):
 def test_an_observer_has_catches_of_each_column_and_contrasts_of_each_pair(run, scans, here):
     span = ["--coherence-width", "6", "--wavelength-range", "300:700", "--step", "50"]
     ran = run("spectrum", scans / "scan0.npy", *PIXEL, *span, "--observer", "avian_uv",
-              "--detector", "20", "30", "40", "-o", "o.csv")  # fmt: skip
-    assert ran.code == 0, ran.err
+              "--detector", "20", "30", "40", "-o", "o.csv").succeeded()  # fmt: skip
     catches = (here / "o-catches.csv").read_text("utf-8").splitlines()
     assert catches[0] == "spectrum,u,s,m,l"
     assert len(catches) == 4

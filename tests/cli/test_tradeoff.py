@@ -36,11 +36,10 @@ def test_the_command_measures_and_recommends(tmp_path, monkeypatch, run, capfd):
     monkeypatch.setattr(command, "QUICK", (48, 100, 256, 1, 1))
     coarse = "--tolerance 1e-02"
     few = TradeoffSetting("default"), TradeoffSetting("tolerance", {"tolerance": 1e-2})
-    monkeypatch.setattr(tradeoff, "settings", lambda quick: iter(few))
+    monkeypatch.setattr(command, "settings", lambda quick: iter(few))
     out = tmp_path / "out"
     ran = run("tradeoff", tmp_path / "heights.npy", "--pixel-size", "0.1", "--quick",
-              "--coherence-width", "4.5", "-o", out)  # fmt: skip
-    assert ran.code == 0, ran.err
+              "--coherence-width", "4.5", "-o", out).succeeded()  # fmt: skip
     assert "recommended (tolerance 0.001): " in ran.out
     document = json.loads((out / "tradeoff.json").read_text("utf-8"))
     assert [record["setting"] for record in document["settings"]] == ["the defaults", coarse]

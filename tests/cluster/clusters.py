@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from mitsuba_diffraction import cluster
 from mitsuba_diffraction.cluster import FrameRequest, FrameSequence
-from mitsuba_diffraction.scene import set_variant
+from mitsuba_diffraction.scene import Stop, set_variant
 
 VARIANT = "llvm_ad_rgb"
 SPP = 24
@@ -20,13 +21,20 @@ def silent(*_):
 def rendered(client, scene, **more):
     """The picture, from workers with one Dr.Jit thread."""
     arguments = {"spp": SPP, "seed": 3, "variant": VARIANT, "threads": 1, **more}
-    return cluster.render(scene, client=client, **arguments)
+    return np.array(cluster.render(scene, client=client, **arguments).bitmap)
 
 
 def film(client, scene, keep, frames=(REQUEST,), warn=pytest.fail):
     """The film of one frame, or of these."""
     set_variant(VARIANT)
     return FrameSequence(client, scene, frames, VARIANT, keep=keep, warn=warn, threads=1)
+
+
+def picture_of(job, progress=silent):
+    """The picture of a film of one frame."""
+    (result,) = job.render(Stop(), progress)
+    assert result.spp == SPP
+    return np.array(result.bitmap)
 
 
 class Recorder:

@@ -11,15 +11,12 @@ import stat
 import numpy as np
 import pytest
 
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster
+from mitsuba_diffraction.cluster import jobs as jobs_module
 from mitsuba_diffraction.cluster import tasks
+from mitsuba_diffraction.cluster.jobs import OrderedMap
+from tests.support.scans import PIXEL, SETTINGS, rough
 from tests.support.systems import posix
-
-distributed = pytest.importorskip("distributed")
-
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
-from mitsuba_diffraction.cluster import jobs as jobs_module  # noqa: E402
-from mitsuba_diffraction.cluster.jobs import OrderedMap  # noqa: E402
-from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -91,8 +88,7 @@ def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_p
         "precompute", "scan.npy", "--pixel-size", PIXEL, "--coherence-width", 6, "--tolerance",
         0.02, "--wavelength-range", "500:600", "--workers", 1,
         "--json", "out.json",
-    )  # fmt: skip
-    assert ran.code == 0, ran
+    ).succeeded()  # fmt: skip
     assert "tasks of windows" in ran.out
     assert DiffractionTable.load("scan.exr").digest() == alone.digest()
     assert json.loads((tmp_path / "out.json").read_text())["workers"]["tasks"] > 10

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
-import sys
 
 import pytest
 
-pytestmark = pytest.mark.thorough
-
-pytest.importorskip("distributed")
 pytest.importorskip("gratinglab")
 
-from mitsuba_diffraction import solve_orders  # noqa: E402
-from mitsuba_diffraction.cli import main  # noqa: E402
-from mitsuba_diffraction.cluster.workers import executor_of  # noqa: E402
-from mitsuba_diffraction.orders import OrderTable  # noqa: E402
-from mitsuba_diffraction.orders.solve import Settings  # noqa: E402
-from mitsuba_diffraction.orders.solve.jobs import Jobs  # noqa: E402
-from mitsuba_diffraction.orders.solve.profiles import sinusoidal  # noqa: E402
-from tests.support import ROOT  # noqa: E402
-from tests.support.orders import digest_in_file  # noqa: E402
+from mitsuba_diffraction import solve_orders
+from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.cluster.workers import executor_of
+from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction.orders.solve import Settings
+from mitsuba_diffraction.orders.solve.jobs import Jobs
+from mitsuba_diffraction.orders.solve.profiles import sinusoidal
+from tests.support.machine import python
+from tests.support.orders import digest_in_file
+
+pytestmark = pytest.mark.thorough
 
 # a perfect conductor has no third variable: some hundred solutions of milliseconds
 PROFILE = sinusoidal(0.5, 0.05)
@@ -73,13 +70,10 @@ sys.exit(main({words!r}))
 def test_a_client_that_was_killed_and_interrupted_goes_on(client, table, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     words = [*WORDS, "-o", "groove.nc", "--scheduler", client.scheduler.address]
-    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
     before = 0
     for name, code in (("SIGKILL", -signal.SIGKILL), ("SIGINT", 130)):
         program = CLIENT.format(count=before + 60, signal=name, words=words)
-        ran = subprocess.run(
-            [sys.executable, "-c", program], env=variables, capture_output=True, text=True
-        )
+        ran = python(program)
         assert ran.returncode == code
         assert "Traceback" not in ran.stderr
         before = len(list((tmp_path / ".groove.solving").glob("*.solved")))

@@ -12,6 +12,11 @@ class Ran(NamedTuple):
     out: str
     err: str
 
+    def succeeded(self) -> Ran:
+        """Check that the run succeeded; the run."""
+        assert self.code == 0, self
+        return self
+
     def failed_in_one_line(self) -> str:
         """Check that the run failed with one line on stderr and nothing else; the line."""
         assert self.code == 1, self

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import HeightField
 
 Array = NDArray[np.float64]
 
 
-def polar(theta: float, phi: float = 0.0) -> Array:
-    """Unit vector (3,) at these angles in degrees from the normal and from x."""
-    theta, phi = np.radians(theta), np.radians(phi)
-    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+def polar(theta: ArrayLike, phi: ArrayLike = 0.0) -> Array:
+    """Unit vectors (…, 3) at these angles in degrees from the normal and from x."""
+    theta, phi = np.broadcast_arrays(np.radians(theta), np.radians(phi))
+    sine = np.sin(theta)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
 
 
 def as_single(values: Array) -> Array:

@@ -11,6 +11,8 @@ import functools
 import math
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -31,9 +33,6 @@ def polar(theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
 
 def flat_interaction(wi: Any, count: int) -> Any:
     """Return points of a flat surface in air, with one or `count` ωi (mi.Vector3f)."""
-    import drjit as dr
-    import mitsuba as mi
-
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.n = mi.Normal3f(0.0, 0.0, 1.0)
     si.sh_frame = mi.Frame3f(si.n)

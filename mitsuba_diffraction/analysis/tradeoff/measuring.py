@@ -172,13 +172,3 @@ def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
     wavenumber = upload(mi.Float, k)
     sums = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
     return np.array(sums, float)
-
-
-def rows(results: Sequence[MeasuredSetting]) -> Iterator[dict[str, Any]]:
-    """Yield one flat record of plain data for each setting."""
-    for result in results:
-        setting = result.setting
-        names = {"group": setting.group, "setting": setting.name}
-        arguments = {"arguments": setting.arguments}
-        measured = {name: value for name, value in vars(result).items() if name != "setting"}
-        yield names | arguments | measured

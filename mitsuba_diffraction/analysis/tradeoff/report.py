@@ -14,7 +14,7 @@ from ...columns import save_rows
 from ...errors import DiffractionError
 from ...images import save_figure
 from .accuracy import Depths, Spectral
-from .measuring import MeasuredSetting, rows
+from .measuring import MeasuredSetting
 
 _ALIKE = 1.1  # factor between equal times: they differ as much from run to run
 
@@ -75,13 +75,18 @@ def recommended(results: Sequence[MeasuredSetting], budget: Budget) -> MeasuredS
 def plain(results: list[MeasuredSetting], depths: Depths) -> dict[str, Any]:
     """Return all settings and the errors over depth as plain data."""
     return {
-        "settings": list(rows(results)),
+        "settings": [
+            {"group": result.setting.group, "setting": result.setting.name,
+             "arguments": result.setting.arguments,
+             **{name: value for name, value in vars(result).items() if name != "setting"}}
+            for result in results
+        ],
         "depths": {
             "depth_um": depths.depth.tolist(),
             "errors": {name: values.tolist() for name, values in depths.errors.items()},
             "intervals": depths.intervals.tolist(),
         },
-    }
+    }  # fmt: skip
 
 
 def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
@@ -93,7 +98,7 @@ def lines(
     results: Sequence[MeasuredSetting],
     spectral: Spectral,
     best: MeasuredSetting,
-    budget: Mapping[str, float | None],
+    budget: Budget,
 ) -> Iterator[str]:
     """Yield a row for each setting, the errors of sums over the spectrum, the recommendation."""
     width = max(len(result.setting.name) for result in results)
@@ -113,7 +118,7 @@ def lines(
     counts = ", ".join(f"{count} {noise:.2f}" for count, noise in spectral.counts.items())
     yield f"sums over the spectrum, ΔE2000: {steps}"
     yield f"wavelengths of a ray, noise of its luminance: {counts}"
-    limits = ", ".join(f"{name} {value:g}" for name, value in budget.items() if value)
+    limits = ", ".join(f"{name} {value:g}" for name, value in vars(budget).items() if value)
     within = f" ({limits})" if limits else ""
     yield (
         f"recommended{within}: {best.setting.name}: error {best.error:.1e}, "

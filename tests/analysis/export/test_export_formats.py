@@ -6,7 +6,6 @@ import itertools
 import json
 import re
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -19,6 +18,8 @@ from mitsuba_diffraction.analysis.export.nodes import ExportGrid
 from mitsuba_diffraction.columns import read_columns
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.orders import OrderTable
+from tests.support.directions import polar
+from tests.support.lanes import brdf_values as f
 from tests.support.orders import thin_grating
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("spectral")]
@@ -31,21 +32,6 @@ FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
 def grating(width=WIDTH, **more):
     field = md.gratings.sinusoidal(period=1.2, depth=0.1, periods=4)
     return md.bsdf_dict(field, coherence_width=width, **more)
-
-
-def f(bsdf, wi, wo, wavelength):
-    """f in 1/sr of unit vectors (n, 3), at one wavelength."""
-    si = dr.zeros(mi.SurfaceInteraction3f, len(wo))
-    si.wi, out = (mi.Vector3f(np.float32(np.atleast_2d(each)).T) for each in (wi, wo))
-    si.wavelengths = mi.Spectrum(wavelength)
-    return np.array(bsdf.eval(mi.BSDFContext(), si, out)[0]) / wo[:, 2]
-
-
-def polar(theta, phi):
-    theta, phi = np.radians(theta), np.radians(phi)
-    return np.stack(
-        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
-    )
 
 
 def ball(bsdf):
@@ -147,24 +133,20 @@ def test_zemax_s_file_has_f_about_the_mirror_direction(tmp_path):
     head, axes, tis, values = read_zemax(file)
     assert (head["ScatterType"], head["Symmetry"]) == ("BRDF", "ASymmetrical4D")
     assert list(axes) == ["SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial"]
-    # azimuth 0 leads from the mirror direction to the normal, 90 to the left of it
-    mirror = polar(40.0, 30.0)
-    to_normal = np.array([0, 0, 1]) - mirror * mirror[2]
-    to_normal /= np.linalg.norm(to_normal)
-    left = np.cross(mirror, to_normal)
-    for azimuth, way in ((0.0, to_normal), (90.0, left), (270.0, -left)):
+    for azimuth in (0.0, 90.0, 270.0):
         k = np.flatnonzero(axes["ScatterAzimuth"] == azimuth)[0]
-        angle = np.radians(axes["ScatterRadial"][2:30])
-        wo = np.cos(angle)[:, None] * mirror + np.sin(angle)[:, None] * way
-        wi = np.tile(mirror * [-1, -1, 1], (len(wo), 1))
-        expected = f(bsdf, wi, wo, 550.0)
+        wo = zemax_directions(40.0, 30.0, azimuth, axes["ScatterRadial"][2:30])
+        expected = f(bsdf, polar(40.0, 210.0), wo, 550.0)
         # means over cells of 5° x 1°, and five digits
         np.testing.assert_allclose(values[1, 1, k, 2:30], expected, atol=0.02 * expected.max())
     assert 0.7 < tis.min() < tis.max() < 1.0  # of aluminium, 0.91 at the normal
 
 
 def zemax_directions(theta, rotation, azimuth, radial):
-    """Directions (…, 3) at angles about the mirror direction, degrees."""
+    """Directions (…, 3) at angles about the mirror direction, degrees.
+
+    Azimuth 0 leads from the mirror direction to the normal, 90 to the left of it.
+    """
     mirror = polar(theta, rotation)
     to_normal = polar(theta + 90.0, rotation) * -1.0
     left = np.cross(mirror, to_normal)
@@ -262,7 +244,7 @@ def lobe_power(bsdf, theta):
     """Power within 12° of the mirror direction of light from φ = 180°, by fine sums."""
     azimuth, radial = np.meshgrid(np.arange(0.0, 360, 3), np.arange(0.005, 12, 0.01), indexing="ij")
     wo = zemax_directions(theta, 0.0, azimuth, radial).reshape(-1, 3)
-    values = f(bsdf, np.tile(polar(theta, 180.0), (len(wo), 1)), wo, 550.0)
+    values = f(bsdf, polar(theta, 180.0), wo, 550.0)
     solid = np.sin(np.radians(radial.ravel())) * np.radians(3.0) * np.radians(0.01)
     return float((values * wo[:, 2] * solid).sum())
 
@@ -341,11 +323,8 @@ def test_a_csv_has_the_scatter_of_each_pair(tmp_path):
     scatter.save_bird(bsdf, tmp_path / "s.json", grid)
     columns = read_columns(tmp_path / "s.csv").of(scatter.CSV_COLUMNS)
     data = json.loads((tmp_path / "s.json").read_text("utf-8"))["data"]
-    np.testing.assert_allclose(columns[:, 5], data["BRDF"]["values"], rtol=1e-5)
-    one = (columns[:, 0] == 40.0) & (columns[:, 4] == 500.0)
-    wo = polar(columns[one, 2], columns[one, 3])
-    expected = f(bsdf, polar(40.0, 30.0), wo, 500.0)
-    assert np.corrcoef(columns[one, 5], expected)[0, 1] > 0.98
+    for column, values in zip(columns.T, data.values(), strict=True):
+        np.testing.assert_allclose(column, values["values"], rtol=1e-5)
 
 
 @pytest.mark.parametrize("solved", [False, True], ids=["heights", "orders"])

@@ -69,37 +69,6 @@ def test_a_mirror_s_lobe_lies_where_a_mirror_reflects_and_is_as_wide_as_the_wind
 
 
 @pytest.mark.usefixtures("variant")
-def test_the_orders_of_a_grating_obey_the_grating_equation():
-    n, period, wavelength, theta = 512, 2.5, 600.0, 30.0
-    result = brdf_map(plugin(GRATING), theta, wavelength=wavelength, resolution=n)
-    x = centres(n)
-    lines = result.luminance.sum(axis=0, dtype=float)
-    found = 0
-    for m in range(-2, 7):
-        place = m * wavelength * 1e-3 / period - np.sin(np.radians(theta))
-        if abs(place) > 0.95:  # at the rim the Jacobian distorts the lobe
-            continue
-        near = np.abs(x - place) < 0.03
-        centroid = (x * lines)[near].sum() / lines[near].sum()
-        assert centroid == pytest.approx(place, abs=1e-3)  # a quarter of a pixel
-        found += 1
-    assert found == 8  # m = −1 … 6
-
-
-@pytest.mark.usefixtures("variant")
-def test_colours_of_an_order_run_from_violet_near_the_mirror_to_red():
-    n = 256
-    result = brdf_map(plugin(GRATING), 0.0, step=10, resolution=n)
-    row = result.linear[n // 2 - 2 : n // 2 + 2].sum(axis=0)
-    x = centres(n)
-    first = (x > 380e-3 / 2.5) & (x < 720e-3 / 2.5)
-    blue, green, red = (x[first][row[first, c].argmax()] for c in (2, 1, 0))
-    # where sRGB's primaries have their dominant wavelengths, 464, 549 and 611 nm, give or take
-    # what the narrower window in the blue and the eye's sensitivity move them by
-    np.testing.assert_allclose([blue, green, red], np.array([452, 535, 605]) / 2500, atol=0.012)
-
-
-@pytest.mark.usefixtures("variant")
 def test_any_bsdf_can_be_mapped_and_a_diffuse_one_is_flat_and_white():
     diffuse = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.5}}
     result = brdf_map(mi.load_dict(diffuse), 50.0, resolution=32)

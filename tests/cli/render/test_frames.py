@@ -54,8 +54,7 @@ def brightness(path):
 
 
 def test_a_parameter_goes_from_its_first_value_to_its_last(render):
-    ran = render("--frames", "3", *LIGHT, "-o", "out")
-    assert ran.code == 0, ran.err
+    ran = render("--frames", "3", *LIGHT, "-o", "out").succeeded()
     assert ran.out.startswith("out: 3 frames, 3 of them new, ")
     assert sorted(os.listdir("out")) == [f"frame_000{n}.png" for n in range(3)]
     found = [brightness(f"out/frame_000{n}.png") for n in range(3)]

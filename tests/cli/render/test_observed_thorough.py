@@ -24,9 +24,8 @@ _EMPTY = _WHITE.replace('<shape type="sphere"><bsdf type="diffuse"/></shape>', "
 def test_a_scene_of_white_light_has_the_catches_of_that_light(run, here, name, light):
     (here / "white.xml").write_text(_EMPTY)
     asked = ["--illuminant", light] if light else []
-    ran = run("render", "white.xml", "-m", "scalar_spectral", "-s", "64", "--observer", name,
-              *asked, "-o", "a.exr")  # fmt: skip
-    assert ran.code == 0, ran.err
+    run("render", "white.xml", "-m", "scalar_spectral", "-s", "64", "--observer", name,
+        *asked, "-o", "a.exr").succeeded()  # fmt: skip
     eye = eye_of(name)
     channels = OpenEXR.File("a.exr").channels()
     assert set(channels) == set(eye.names)

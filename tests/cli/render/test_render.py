@@ -18,8 +18,7 @@ from tests.support.room import QUICK, SCENE, pixels, png
 
 
 def test_an_exr_and_a_png_are_written_and_named(run, scene):
-    ran = run("render", scene, *QUICK)
-    assert ran.code == 0
+    ran = run("render", scene, *QUICK).succeeded()
     assert sorted(os.listdir()) == ["room.exr", "room.png", "room.xml"]
     assert ran.out.startswith("room.exr and room.png: 24 x 16 pixels, 4 samples per pixel, ")
     assert pixels("room.exr").shape == (16, 24, 3)
@@ -32,16 +31,6 @@ def test_a_png_alone_can_be_asked_for(run, scene):
     report = json.loads(Path("a.json").read_text(encoding="utf-8"))
     assert (report["files"], report["pixels"], report["spp"]) == (["a.png"], [24, 16], 4)
     assert sorted(os.listdir()) == ["a.json", "a.png", "room.xml"]
-
-
-def test_the_png_is_srgb_and_exposure_is_in_stops(run, scene):
-    assert run("render", scene, *QUICK, "-s", "1", "-o", "a.exr", "--exposure", "0.5",
-               "--tonemap", "standard").code == 0  # fmt: skip
-    linear = np.minimum(pixels("a.exr") * 2**0.5, 1)
-    # IEC 61966-2-1
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    shown, _ = png("a.png")
-    assert np.abs(shown - 255 * encoded).max() < 1  # Mitsuba dithers between the two neighbours
 
 
 def test_the_corner_shows_the_emitter(run, scene):
@@ -85,8 +74,7 @@ def test_alpha_is_straight_in_the_png(run, scene):
 
 
 def test_the_default_variant_is_spectral(run, scene):
-    ran = run("render", scene, "-s", "1")
-    assert ran.code == 0, ran.err
+    ran = run("render", scene, "-s", "1").succeeded()
     assert "_ad_spectral" in ran.out
 
 
@@ -97,8 +85,7 @@ def test_films_without_colours_are_written_as_exr_only(run, scene):
                  'value="400:0, 500:1, 600:0"/>')
     )  # fmt: skip
     mode = ["-m", "scalar_spectral", "-s", "1"]
-    ran = run("render", scene, *mode, "-o", "a.exr")
-    assert ran.code == 0
+    ran = run("render", scene, *mode, "-o", "a.exr").succeeded()
     assert "only the EXR was written" in ran.err
     assert list(OpenEXR.File("a.exr").channels()) == ["band_a"]
     line = run("render", scene, *mode, "-o", "b.png").failed_in_one_line()
@@ -122,8 +109,7 @@ def test_further_channels_are_kept_in_the_exr(run, scene):
 def test_pixels_that_are_not_numbers_are_counted(run, scene):
     scene.write_text(SCENE.replace('<rgb name="radiance" value="0.5"/>',
                                    '<spectrum name="radiance" value="nan"/>'))  # fmt: skip
-    ran = run("render", scene, *QUICK, "-o", "a.exr", "-s", "1")
-    assert ran.code == 0
+    ran = run("render", scene, *QUICK, "-o", "a.exr", "-s", "1").succeeded()
     assert "pixels not finite" in ran.err
 
 
@@ -156,8 +142,7 @@ def patch_scene(scene, heights, monkeypatch):
 
 
 def test_a_diffracting_scene_renders(run, patch_scene):
-    ran = run("render", patch_scene, "-m", "llvm_ad_spectral", "-s", "1", "-o", "a.exr")
-    assert ran.code == 0, ran.err
+    run("render", patch_scene, "-m", "llvm_ad_spectral", "-s", "1", "-o", "a.exr").succeeded()
     picture = pixels("a.exr")
     assert np.isfinite(picture).all()
     assert picture[8, 12].sum() > 0  # the sphere reflects the room
@@ -181,8 +166,7 @@ def test_doubts_about_a_patch_are_counted_and_info_has_them(run, patch_scene):
     ran = run(
         "render", patch_scene, "-m", "llvm_ad_spectral", "-s", "1", "-o", "a.png",
         "-D", "pixel_size=0.2",
-    )  # fmt: skip
-    assert ran.code == 0
+    ).succeeded()  # fmt: skip
     (line,) = ran.err.splitlines()
     number, command = re.search(r"(\d+) notes? on .*: mitsuba-diffraction (.*)$", line).groups()
     described = json.loads(run(*shlex.split(command), "--json").out)
@@ -201,8 +185,7 @@ def test_a_scene_that_names_a_retired_parameter_is_rendered(run, heights, here, 
     for file, parameter in (("old.xml", line), ("new.xml", "")):
         text = SCENE.replace('<bsdf type="diffuse"/>', surface % parameter)
         (here / file).write_text(text, encoding="utf-8")
-        ran = run("render", file, *QUICK, "-s", "1", "-o", file.replace("xml", "exr"))
-        assert ran.code == 0
+        ran = run("render", file, *QUICK, "-s", "1", "-o", file.replace("xml", "exr")).succeeded()
         assert ran.err.count(f"{name} is no longer a parameter") == (file == "old.xml")
     # threads add the samples of a pixel in any order, in single precision
     np.testing.assert_allclose(pixels("old.exr"), pixels("new.exr"), rtol=1e-5)
@@ -211,8 +194,7 @@ def test_a_scene_that_names_a_retired_parameter_is_rendered(run, heights, here, 
 def test_the_exr_has_a_channel_for_each_receptor_and_the_png_a_legend(run, scene):
     ran = run(
         "render", scene, "-m", "scalar_spectral", "-s", "16", "--observer", "dog", "-o", "a.exr"
-    )
-    assert ran.code == 0, ran.err
+    ).succeeded()
     assert "channels s, l" in ran.out
     channels = OpenEXR.File("a.exr").channels()
     assert set(channels) == {"s", "l"}
