@@ -18,6 +18,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
+import drjit as dr
+import mitsuba as mi
+
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
 from ..heights.lengths import numbers_of
@@ -25,13 +28,14 @@ from ..inputs import note_input
 from ..llvm import require_llvm
 from ..plugin import installed
 from ..system import memory
+from .bands import SensorBands, check_bands, put_bands, warn_of_dark_bands, wider_tables
 from .elements import check_attributes, name_of, surfaces_within
 from .meshes import has_texcoords
+from .orbit import turn_cameras
 from .parameters import check_includes, check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
-    from .bands import SensorBands
     from .surfaces import Edit
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
@@ -50,6 +54,8 @@ _NO_PLY = re.compile(
     r'Error while loading PLY file "(?P<file>[^"]+)": (?:"[^"]+": )?'
     r"(?P<why>(?:invalid PLY|incompatible contents|trailing tokens) .*)"
 )
+# an index of an OBJ file below 0, to which Mitsuba adds 2^32
+_RELATIVE = re.compile(r"reference to invalid (vertex|normal|texture coordinate) (4\d{9})\b")
 _UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
 _PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
 # mi.load_file's own arguments: a scene parameter of that name could not be passed.
@@ -67,9 +73,6 @@ def set_variant(name: str | None) -> str:
 
     Raises a DiffractionError if there is no such variant, or no device or LLVM for it.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     if name is None:
         name = "cuda" if dr.has_backend(dr.JitBackend.CUDA) else "llvm"
         name += "_ad_spectral"
@@ -105,11 +108,7 @@ def load_scene(
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
-    import mitsuba as mi
-
     from .additions import split_values
-    from .bands import check_bands, warn_of_dark_bands, wider_tables
-    from .orbit import turn_cameras
 
     readable_file(file)
     defaults = parameters_of(file, parameters) or {}
@@ -121,13 +120,10 @@ def load_scene(
     for name in _TAKEN:
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
-    try:
-        serving = contextlib.nullcontext() if bands is None else wider_tables(bands.first)
-        with serving, _files_beside(file):
-            _check_parameters_act(file, values, defaults)
-            scene, edits = _instantiated(file, known, values, box_filter, bands)
-    except (RuntimeError, UnicodeDecodeError) as error:
-        raise error_of("cannot load the scene", error) from error
+    serving = contextlib.nullcontext() if bands is None else wider_tables(bands.first)
+    with serving, _read_by_mitsuba(file):
+        _check_parameters_act(file, values, defaults)
+        scene, edits = _instantiated(file, known, values, box_filter, bands)
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
     # Found inside twosided, blendbsdf and the like, too
@@ -155,25 +151,17 @@ def check_values(file: Path, parameters: Mapping[str, Any]) -> None:
 
     Raises a DiffractionError with the parameter's place in the scene.
     """
-    import mitsuba as mi
-
     from .additions import split_values
 
     values = split_values(parameters, parameters_of(file, parameters) or {})
-    config = mi.parser.ParserConfig(mi.variant())
-    try:
-        with _files_beside(file):
-            mi.parser.parse_file(config, str(file), **values.parameters)
-    except RuntimeError as error:
-        raise error_of("cannot load the scene", error) from error
+    with _read_by_mitsuba(file):
+        mi.parser.parse_file(mi.parser.ParserConfig(mi.variant()), str(file), **values.parameters)
 
 
 def _check_parameters_act(
     file: Path, values: SceneValues, defaults: Mapping[str, str | None]
 ) -> None:
     """Refuse values other than the defaults that only BSDFs read which surfaces on ids replace."""
-    import mitsuba as mi
-
     from .additions import FITTED
     from .mesh_materials import split_meshes
     from .surfaces import effective, put_materials
@@ -225,10 +213,7 @@ def _instantiated(
 
     known : files that the scene may include.
     """
-    import mitsuba as mi
-
     from .additions import FITTED, fit_meshes, put_box_filters, remove_dark_lights
-    from .bands import put_bands
     from .clamping import put_clamp
     from .mesh_materials import split_meshes
     from .nodes import check_nodes
@@ -244,7 +229,6 @@ def _instantiated(
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)
-        _note_files(state)
         of_meshes = split_meshes(state, values.materials, FITTED)
         fit_meshes(state, Path(folder))
         edits = put_materials(state, values.materials, of_meshes)
@@ -262,16 +246,16 @@ def _instantiated(
 
 
 @contextlib.contextmanager
-def _files_beside(scene: Path) -> Iterator[None]:
-    """Resolve files that a scene names relative to it."""
-    import mitsuba as mi
-
+def _read_by_mitsuba(scene: Path) -> Iterator[None]:
+    """Resolve files that a scene names relative to it, and raise Mitsuba's errors as `error_of`."""
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
     resolver.prepend(str(scene.absolute().parent))
     mi.set_file_resolver(resolver)
     try:
         yield
+    except (RuntimeError, UnicodeDecodeError) as error:
+        raise error_of("cannot load the scene", error) from error
     finally:
         mi.set_file_resolver(before)
 
@@ -294,8 +278,6 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
 
 def shrink(sensor: Any, factor: float = 2.0) -> None:
     """Divide the width and height of a sensor's film, its crop included, by a factor."""
-    import mitsuba as mi
-
     values = mi.traverse(sensor)
     for name in ("film.size", "film.crop_size", "film.crop_offset"):
         least = 0 if name.endswith("offset") else 1
@@ -326,28 +308,11 @@ def sensor_of(scene: Any, index: int, preview: bool = False) -> Any:
     return sensors[index]
 
 
-def _note_files(state: Any) -> None:
-    """Note the files that a parsed scene names as inputs, where Mitsuba finds them.
-
-    state : `mi.parser.ParserState`.
-    """
-    import mitsuba as mi
-
-    for node in state.nodes:
-        props = node.props
-        for name in list(props.keys()):
-            if props.type(name) == mi.Properties.Type.String and len(text := props[name]) < 1024:
-                note_input(str(mi.file_resolver().resolve(text)))
-                props.mark_queried(name, False)  # Mitsuba refuses what no plugin reads
-
-
 def _check_films(state: Any) -> None:
     """Refuse films whose pictures would exceed the memory of this machine.
 
     state : `mi.parser.ParserState`; no surface is loaded yet, since that may take minutes.
     """
-    import mitsuba as mi
-
     for node in state.nodes:
         if node.type != mi.ObjectType.Film:
             continue
@@ -372,10 +337,10 @@ def _check_films(state: Any) -> None:
 
 
 def plain_text(error: BaseException) -> str:
-    """Return the text of Mitsuba's exception as one line: where in the scene, and the mistake. The
+    """Return the text of Mitsuba's exception as one line: where in the scene, and the mistake.
 
-    places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
-    "while loading" are left out.
+    The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated "while
+    loading" are left out.
     """
     text = _TRACEBACK.sub("", _SOURCE_LINE.sub("", _words(error)))
     places = [(m["file"], m["line"]) for m in _LOADING.finditer(text)]
@@ -391,7 +356,7 @@ def plain_text(error: BaseException) -> str:
     text = re.sub(r"\n\s*- ", " ", text)  # lists
     text = _UNUSED.sub(_unused, text)
     text = _INSTANTIATE.sub(lambda m: f"{m['kind']} {m['type']!r}: ", text)
-    text = one_line(_PLUGIN.sub("", text)).rstrip(" .!")
+    text = one_line(_PLUGIN.sub("", with_relative_indices(text))).rstrip(" .!")
     if places:
         file, line = places[-1]
         text = f"'{file}', {line}: {text}"
@@ -410,6 +375,17 @@ def error_of(failed: str, error: BaseException) -> BaseException:
     if original[1] == "SystemExit":
         return SystemExit(int(original[2] or 1))
     return KeyboardInterrupt() if original[1] == "KeyboardInterrupt" else MemoryError()
+
+
+def with_relative_indices(text: str) -> str:
+    """Show the indices below 0 of an OBJ file in a message of Mitsuba's as the file has them."""
+    return _RELATIVE.sub(
+        lambda match: (
+            f"it names {match[1]} {int(match[2]) - (1 << 32)}, counted back from the "
+            "last, which Mitsuba does not read"
+        ),
+        text,
+    )
 
 
 def _words(error: BaseException) -> str:

@@ -179,7 +179,7 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
                 f"and faceVertexIndices {len(corners)}; export the mesh again"
             )
         check_indices(corners, len(points.reshape(-1, 3)), f"mesh '{file}'")
-        faces = _fans(counts)
+        faces = fans(counts)
         if mesh.GetOrientationAttr().Get() == "leftHanded":
             faces = faces[:, ::-1]
         own = geometry.Primvar(mesh.GetNormalsAttr())
@@ -195,7 +195,7 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
         )
 
 
-def _fans(counts: Whole) -> Whole:
+def fans(counts: Whole) -> Whole:
     """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
 
     counts : corners of each polygon.
