@@ -21,6 +21,7 @@ from ..arrays import Single
 from ..atomic import atomic_path
 from ..errors import DiffractionError, quoted
 from ..images import read_picture
+from ..plugin.memory import tensor
 from ..tables import write_channels
 
 #: Quantity of the dots: of each label, from black to white, at each dot, or of all.
@@ -240,7 +241,4 @@ def _enlarged(values: NDArray[np.float64], texels: int) -> Single:
 
 def _texture(values: Single) -> dict[str, Any]:
     """Return a bitmap without interpolation: a mean of two gratings would be a wrong grating."""
-    from ..plugin.memory import tensor
-
-    data = tensor(values)
-    return {"type": "bitmap", "raw": True, "filter_type": "nearest", "data": data}
+    return {"type": "bitmap", "raw": True, "filter_type": "nearest", "data": tensor(values)}
