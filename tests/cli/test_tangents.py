@@ -18,22 +18,7 @@ from mitsuba_diffraction.scene.orientation import (
     write_ply,
 )
 from scenes.make import knot
-
-
-def obj_of(path, positions, faces):
-    """Write an OBJ without normals and texture coordinates."""
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in positions]
-    lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
-    path.write_text("\n".join(lines))
-
-
-def ring(n, m):
-    """A torus around z of radii 1 and 0.4, without texture coordinates, and its triangles."""
-    i, j = (k.ravel() for k in np.indices((n, m)))
-    out, up = 1 + 0.4 * np.cos(2 * np.pi * j / m), 0.4 * np.sin(2 * np.pi * j / m)
-    places = np.stack([out * np.cos(2 * np.pi * i / n), out * np.sin(2 * np.pi * i / n), up], 1)
-    number = np.pad(np.arange(n * m).reshape(n, m), ((0, 1), (0, 1)), mode="wrap")
-    return places, grid_faces(number)
+from tests.support.meshes import obj_of, ring
 
 
 @pytest.fixture
@@ -127,7 +112,7 @@ def test_texture_coordinates_are_kept(run, tmp_path):
 
 def test_a_field_that_breaks_along_lines_is_said_with_their_length(run, here):
     """Along z, a ring breaks along its top and its bottom, 2 · 2π in all; its size is 2.8."""
-    obj_of(here / "ring.obj", *ring(48, 24))
+    obj_of(here / "ring.obj", *ring(48, 24, radii=(1.0, 0.4))[::2])
     ran = run("tangents", "ring.obj", "-o", "field.ply", "--along", "z")
     assert ran.code == 0
     assert "smooth everywhere" not in ran.out

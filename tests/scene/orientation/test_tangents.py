@@ -17,6 +17,7 @@ from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mes
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
 from tests.support import ROOT
+from tests.support.meshes import ball, obj_of, ring, tube
 
 PLY = b"""ply
 format binary_little_endian 1.0
@@ -216,9 +217,7 @@ def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
             struct.pack(f"{order}BB{len(p)}i", 7, len(p), *p) for p in polygons
         )  # fmt: skip
     (tmp_path / "polygons.ply").write_bytes(header + body)
-    lines = [f"v {x} {y} 0" for x, y in corners]
-    lines += ["f " + " ".join(str(n + 1) for n in p) for p in polygons]
-    (tmp_path / "polygons.obj").write_text("\n".join(lines) + "\n")
+    obj_of(tmp_path / "polygons.obj", [(x, y, 0.0) for x, y in corners], polygons)
     ours, theirs = (load_mesh(tmp_path / f"polygons.{kind}") for kind in ("ply", "obj"))
     np.testing.assert_array_equal(ours[0][ours[3]], theirs[0][theirs[3]])
     # cut short, it is refused as any damaged file
@@ -227,13 +226,20 @@ def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
         load_mesh(tmp_path / "short.ply")
 
 
-def test_a_damaged_mesh_is_named_once_with_its_mistake(tmp_path):
+@pytest.mark.parametrize(
+    ("corners", "mistake"),
+    [
+        ("1 2 99", "reference to invalid vertex 99"),
+        ("-3 -2 -1", "it names vertex -3, counted back from the last, which Mitsuba does not read"),
+    ],
+)
+def test_a_damaged_mesh_is_named_once_with_its_mistake(tmp_path, corners, mistake):
     file = tmp_path / "bad.obj"
-    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n")
+    file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf {corners}\n")
     with pytest.raises(DiffractionError) as caught:
         load_mesh(file)
     assert str(caught.value).count("bad.obj") == 1
-    assert "cannot be read: reference to invalid vertex 99; export it again" in str(caught.value)
+    assert f"cannot be read: {mistake}; export it again" in str(caught.value)
 
 
 def report_of(positions, normals, faces, along, smoothing=0.03):
@@ -243,40 +249,15 @@ def report_of(positions, normals, faces, along, smoothing=0.03):
     return check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces, mesh.orientation)
 
 
-def ring(n, m):
-    """A torus around z of radii 1 and 0.42."""
-    i, j = (
-        2 * np.pi * k.ravel() / most for k, most in zip(np.indices((n, m)), (n, m), strict=True)
-    )
-    out = np.stack([np.cos(i), np.sin(i), 0 * i], axis=1)
-    normals = np.cos(j)[:, None] * out + np.sin(j)[:, None] * [0.0, 0.0, 1.0]
-    number = np.pad(np.arange(n * m).reshape(n, m), ((0, 1), (0, 1)), mode="wrap")
-    return out + 0.42 * normals, normals, grid_faces(number)
-
-
-def tube(n, m):
-    """An open cylinder around z of radius 1 and height 3; the x axis is between vertices."""
-    i, j = (k.ravel() for k in np.indices((n, m + 1)))
-    angle = 2 * np.pi * (i + 0.5) / n
-    normals = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    number = np.pad(np.arange(n * (m + 1)).reshape(n, m + 1), ((0, 1), (0, 0)), mode="wrap")
-    return normals + np.outer(3.0 * j / m, [0.0, 0.0, 1.0]), normals, grid_faces(number)
-
-
-def ball(n):
-    """Of radius 1, with one vertex at each pole."""
-    i, j = (k.ravel() for k in np.indices((n + 1, 2 * n + 1)))
-    theta, phi = np.pi * i / n, np.pi * (j % (2 * n)) / n
-    p = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
-    p = np.round(p, 12) + 0.0
-    return p, p, grid_faces(np.arange(len(p)).reshape(n + 1, 2 * n + 1))
+#: Of a ring.
+RADII = (1.0, 0.42)
 
 
 # a field that is smooth over 0.28 breaks where it is smallest: measured, 0.06 further in
 @pytest.mark.parametrize(("smoothing", "moved"), [(0.001, 0.0), (0.03, 0.0), (0.1, 0.06)])
 @pytest.mark.parametrize("cells", [(24, 16), (60, 40)])
 def test_a_ring_along_its_axis_breaks_along_two_circles(cells, smoothing, moved):
-    report = report_of(*ring(*cells), "z", smoothing)
+    report = report_of(*ring(*cells, radii=RADII), "z", smoothing)
     # half a cell beside the circles of radius 1, which are polygons
     assert report.broken < 4 * np.pi
     assert report.broken == pytest.approx(4 * np.pi, rel=0.42 * np.pi / cells[1] + 0.01 + moved)
@@ -291,7 +272,7 @@ def test_a_tube_across_its_axis_breaks_along_two_lines(cells):
     assert report_of(*tube(*cells), "x").broken == pytest.approx(6.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("mesh", [ring(48, 24), tube(48, 20)])
+@pytest.mark.parametrize("mesh", [ring(48, 24, radii=RADII), tube(48, 20)])
 def test_a_smooth_field_does_not_break(mesh):
     report = report_of(*mesh, "smooth")
     assert report.broken == 0.0
