@@ -45,19 +45,14 @@ def name_of(element: Any, number: int | None = None) -> str:
     if file:
         kind = f"the mesh {Path(file[1]).name}"
     else:
-        kind = f"{_with_article(element.class_name())} without id"
+        words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", element.class_name()).lower()
+        kind = f"{'an' if words[:1] in 'aeiou' else 'a'} {words} without id"
     return kind if number is None else f"shape {number + 1} ({kind})"
 
 
 def own_id(name: str) -> str:
     """Return the id that the scene gives, empty if Mitsuba made it up."""
     return "" if name.startswith(_UNNAMED) else name
-
-
-def _with_article(kind: str) -> str:
-    """`AreaLight` as "an area light"."""
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
-    return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
 
 
 def surfaces_text(scene: Any) -> str:

@@ -55,7 +55,7 @@ _NO_PLY = re.compile(
     r"(?P<why>(?:invalid PLY|incompatible contents|trailing tokens) .*)"
 )
 # an index of an OBJ file below 0, to which Mitsuba adds 2^32
-_RELATIVE = re.compile(r"reference to invalid (vertex|normal|texture coordinate) (4\d{9})\b")
+_RELATIVE = re.compile(r"reference to invalid (vertex|normal|texture coordinate) ([2-4]\d{9})\b")
 _UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
 _PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
 # mi.load_file's own arguments: a scene parameter of that name could not be passed.

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.scene.load import load_scene, plain_text
-from tests.support.room import SKIN, scene_of, skin
+from tests.support.room import SKIN, scene_file, skin
 
 TWOSIDED = f'<bsdf type="twosided">{SKIN}</bsdf>'
 FOLLOWING = skin(
@@ -68,7 +68,7 @@ def obj_scene(folder, mesh, bsdf):
     """Write a scene of a mesh, and the mesh beside it."""
     (folder / "mesh.obj").write_text(mesh)
     name = '<string name="filename" value="mesh.obj"/>'
-    return scene_of(folder, f'<shape type="obj" id="hide">{name}{bsdf}</shape>')
+    return scene_file(folder, f'<shape type="obj" id="hide">{name}{bsdf}</shape>')
 
 
 @pytest.mark.usefixtures("variant")
@@ -86,7 +86,7 @@ def test_shapes_without_id_are_named_by_file_or_place(tmp_path):
         DiffractionWarning, match=r"coordinates on shape 1 \(the mesh mesh\.obj\): the"
     ):
         load_scene(file, {})
-    scene_of(tmp_path, f'<shape type="sphere"/><shape type="sphere">{FOLLOWING}</shape>')
+    scene_file(tmp_path, f'<shape type="sphere"/><shape type="sphere">{FOLLOWING}</shape>')
     with pytest.raises(
         DiffractionError, match=r"^shape 2 \(a sphere without id\) has no .* or use a mesh$"
     ):

@@ -10,7 +10,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.load import load_scene
 from tests.support.orders import thin_grating
-from tests.support.room import scene_of, skin
+from tests.support.room import scene_file, skin
 
 EXPORTED = """
 	<bsdf type="twosided" id="mat-Skin" name="mat-Skin">
@@ -29,7 +29,7 @@ DISK = '<shape type="disk"><ref id="skin"/></shape>'
 @pytest.fixture
 def surface(tmp_path: Path) -> Path:
     mi.set_variant("llvm_ad_spectral")
-    scene_of(tmp_path, EXPORTED)
+    scene_file(tmp_path, EXPORTED)
     return tmp_path
 
 
@@ -62,7 +62,7 @@ def test_unknown_ids_are_answered_with_those_of_the_scene(surface):
 
 def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
     thin_grating(0.6, counts=(2, 2, 1)).save(surface / "orders.nc")
-    scene = scene_of(surface, skin('<float name="orientation" value="30"/>'), DISK)
+    scene = scene_file(surface, skin('<float name="orientation" value="30"/>'), DISK)
     loaded = load_scene(scene, {"material:skin": str(surface / "orders.nc")})
     text = str(loaded.shapes()[0].bsdf())
     assert "DiffractionOrders[" in text
@@ -73,7 +73,7 @@ def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
 @pytest.mark.parametrize("thin", [True, False], ids=["table", "heights"])
 def test_light_goes_through_a_sheet_that_replaces_a_material(surface, thin):
     thin_grating(0.6, counts=(2, 2, 1), thin=True).save(surface / "sheet.nc")
-    scene = scene_of(surface, '<bsdf type="diffuse" id="skin"/>', DISK)
+    scene = scene_file(surface, '<bsdf type="diffuse" id="skin"/>', DISK)
     heights = f"{surface / 'grating.toml'}{SETTINGS},thin=true,int_ior=1.5"
     text = str(surface / "sheet.nc") if thin else heights
     loaded = load_scene(scene, {"material:skin": text})
@@ -95,7 +95,7 @@ def test_a_look_is_put_on_an_id(surface):
 @pytest.mark.parametrize("old", ["material=Al", "pigment=0.25"])
 def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surface, old):
     name, value = old.split("=")
-    scene_of(surface, skin(f'<string name="{name}" value="{value}"/>'), DISK)
+    scene_file(surface, skin(f'<string name="{name}" value="{value}"/>'), DISK)
     text = bsdfs(surface, {"skin": SETTINGS + ",int_ior=1.6"}).popitem()[1]
     # a metal beneath would look like chrome
     assert text.count("Diffraction[") == text.count("brdf[")
@@ -111,14 +111,14 @@ def test_an_unknown_id_is_named_as_it_was_typed(surface):
 
 
 def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):
-    scene_of(surface, '<bsdf type="diffuse" id="spare"/>', EXPORTED)
+    scene_file(surface, '<bsdf type="diffuse" id="spare"/>', EXPORTED)
     with pytest.raises(DiffractionError, match=r"no shape uses .*'spare'; .*mat-Skin, mat-Ground"):
         bsdfs(surface, {"spare": SETTINGS})
 
 
 @pytest.mark.parametrize("part", ['<bsdf type="plastic"', '<ref id="below"'])
 def test_what_lies_beneath_a_replaced_surface_is_kept(surface, part):
-    scene_of(surface, '<bsdf type="plastic" id="below"/>', skin(f'{part} name="beneath"/>'), DISK)
+    scene_file(surface, '<bsdf type="plastic" id="below"/>', skin(f'{part} name="beneath"/>'), DISK)
     text = bsdfs(surface, {"skin": SETTINGS}).popitem()[1]
     assert "Plastic" in text
     assert text.count("Diffraction[") == 2  # on both sides
@@ -132,7 +132,7 @@ def test_a_surface_that_another_one_hides_is_refused(surface, order):
 
 
 def test_two_ids_of_one_bsdf_get_one_surface(surface):
-    scene_of(surface, EXPORTED, '<alias id="mat-Skin" as="hide"/>')
+    scene_file(surface, EXPORTED, '<alias id="mat-Skin" as="hide"/>')
     assert "Diffraction[" in bsdfs(surface, {"hide": SETTINGS})["elm__0"]
     with pytest.raises(DiffractionError, match="both ids are of one BSDF"):
         bsdfs(surface, {"hide": SETTINGS, "mat-Skin": SETTINGS})
@@ -140,7 +140,7 @@ def test_two_ids_of_one_bsdf_get_one_surface(surface):
 
 @pytest.mark.parametrize("name", ["mat-Skin", "elm__0"])
 def test_the_opacity_around_a_replaced_bsdf_is_kept(surface, name):
-    scene_of(surface, EXPORTED.replace('"twosided" id="mat-Skin"', '"mask" id="mat-Skin"'))
+    scene_file(surface, EXPORTED.replace('"twosided" id="mat-Skin"', '"mask" id="mat-Skin"'))
     text = bsdfs(surface, {name: SETTINGS})["elm__0"]
     assert text.startswith("Mask[")
     assert "Diffraction[" in text
@@ -163,10 +163,10 @@ def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
     metal = f"{surface / 'grating.toml'}{SETTINGS},material=Al"
     radius = '<default name="r" value="1"/>'
     ball = '<shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>'
-    scene = scene_of(surface, radius, skin('<float name="lateral_scale" value="$r"/>'), ball)
+    scene = scene_file(surface, radius, skin('<float name="lateral_scale" value="$r"/>'), ball)
     load_scene(scene, {"material:skin": metal, "r": "2"})  # of the sphere
     stretched = skin('<float name="lateral_scale" value="$up"/>')
-    scene_of(surface, radius, '<default name="up" value="0"/>', stretched, ball)
+    scene_file(surface, radius, '<default name="up" value="0"/>', stretched, ball)
     load_scene(scene, {"material:skin": metal, "up": "0.0"})  # the default
     with pytest.raises(DiffractionError, match=r"up=2 changes nothing"):
         load_scene(scene, {"material:skin": metal, "up": "2"})
@@ -179,7 +179,7 @@ def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surfa
     )
     (surface / "dark.xml").write_text('<scene version="3.0.0"/>')
     light = '<default name="light" value="dark.xml"/><include filename="$light"/>'
-    scene = scene_of(surface, '<bsdf type="diffuse" id="skin"/>', DISK, light)
+    scene = scene_file(surface, '<bsdf type="diffuse" id="skin"/>', DISK, light)
     metal = f"{surface / 'grating.toml'}{SETTINGS},material=Al"
     values = {"material:skin": metal, "light": str(surface / "lit.xml"), "power": "2"}
     assert len(load_scene(scene, values).emitters()) == 1

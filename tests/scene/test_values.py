@@ -12,7 +12,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.additions import CLAMP
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orbit import vertical
-from tests.support.room import scene_of, skin
+from tests.support.room import scene_file, skin
 
 METAL = skin('<string name="material" value="$material"/>')
 DEFAULTS = """<default name="lamp" value="1"/><default name="sky" value="1"/>
@@ -30,7 +30,7 @@ BALL = '<shape type="sphere"><bsdf type="twosided">{}</bsdf></shape>'
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     mi.set_variant("llvm_ad_spectral")
-    return scene_of(tmp_path, DEFAULTS, BALL.format(METAL), LIGHTS)
+    return scene_file(tmp_path, DEFAULTS, BALL.format(METAL), LIGHTS)
 
 
 def test_parameters_of_the_surface_reach_it(scene):
@@ -45,7 +45,7 @@ def test_the_scenes_own_parameter_goes_first(scene):
 
 
 def test_a_scene_without_the_surface_refuses_its_parameters(scene):
-    scene_of(scene.parent, DEFAULTS, BALL.format('<bsdf type="diffuse"/>'), LIGHTS)
+    scene_file(scene.parent, DEFAULTS, BALL.format('<bsdf type="diffuse"/>'), LIGHTS)
     with pytest.raises(DiffractionError, match="as a material or a preset"):
         load_scene(scene, {"height_scale": "0.5"})
     with pytest.raises(DiffractionError, match="did you mean lamp"):
@@ -70,7 +70,7 @@ CAMERA = """
 
 def test_a_camera_goes_around_the_middle_of_the_shapes(tmp_path: Path) -> None:
     mi.set_variant("scalar_rgb")
-    file = scene_of(tmp_path, CAMERA)
+    file = scene_file(tmp_path, CAMERA)
 
     def pose(degrees: float) -> np.ndarray:
         scene = load_scene(file, {"render:orbit": str(degrees)})

@@ -62,7 +62,7 @@ def skin(*more: str) -> str:
     return named.replace("</bsdf>", f"{''.join(more)}</bsdf>")
 
 
-def scene_of(folder: Path, *elements: str) -> Path:
+def scene_file(folder: Path, *elements: str) -> Path:
     """Write `scene.xml` of some elements, and the recipe of `SKIN`, into a folder."""
     (folder / "grating.toml").write_text(GRATING)
     file = folder / "scene.xml"

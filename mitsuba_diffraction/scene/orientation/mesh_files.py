@@ -21,7 +21,7 @@ from ..elements import ORIENTATION
 from ..load import with_relative_indices
 from ..meshes import SmoothMesh, mesh_arrays
 from .interchange import fans, interchange_mesh
-from .mesh_indices import any_line_begins, check_mesh, ply_header
+from .mesh_indices import FORMATS, any_line_begins, check_mesh, ply_header
 from .trimesh import TriangleMesh, vertex_normals
 
 # What Mitsuba says before the mistake: places in its sources, its plugins, and the file
@@ -72,7 +72,7 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
             mi.set_variant("scalar_rgb")
         loaded = _load(file)
         if loaded.has_attribute(ORIENTATION):
-            turns = np.array(mi.traverse(loaded)[ORIENTATION], dtype=np.float64)
+            turns = np.array(loaded.attribute_buffer(ORIENTATION), dtype=np.float64)
             turns = turns.reshape(loaded.vertex_count(), -1)[:, :2]
         arrays = mesh_arrays(loaded)
         # Mitsuba's normals have seams where texture coordinates have
@@ -188,12 +188,11 @@ def triangulated_ply(file: Path) -> bytes | None:
     if header is None or [e.name for e in header.elements[:2]] != ["vertex", "face"]:
         return None
     (vertex, face), content = header.elements[:2], header.content(file, shown)
-    row = header.row(vertex, 0)
-    if any(words[0] == "list" for words in vertex.properties):
+    if header.format not in FORMATS or any(words[0] == "list" for words in vertex.properties):
         return None
-    at = vertex.number * row.itemsize
-    vertices = np.frombuffer(content, row, vertex.number)
-    counts, corners = [], []
+    row = header.row(vertex, 0)
+    vertices, at = np.frombuffer(content, row, vertex.number), vertex.number * row.itemsize
+    counts, polygons = [], []
     for _ in range(face.number):
         for words in face.properties:
             size = 1
@@ -206,9 +205,11 @@ def triangulated_ply(file: Path) -> bytes | None:
                 raise ValueError
             if words[-1] in ("vertex_indices", "vertex_index"):
                 counts.append(size)
-                corners.append(np.frombuffer(content, kind, size, at))
+                polygons.append(np.frombuffer(content, kind, size, at))
             at += size * kind.itemsize
-    triangles = np.concatenate(corners)[fans(np.array(counts))]
+    corners = np.concatenate(polygons)
+    if not (np.abs(corners) < float(1 << 31)).all():  # texts may have any number, or none
+        raise ValueError
     text = header.format == "ascii"
     properties = [f"{'double' if text else kind} {name}" for kind, name in vertex.properties]
-    return _ply(header.order, properties, vertices, triangles)
+    return _ply(header.order, properties, vertices, corners[fans(np.array(counts))])

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError, counted, quoted
 from ...limits import check_content
 
+#: Formats of the content of a PLY file.
+FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
 # NumPy's codes of the types of a PLY file
 _CODES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",

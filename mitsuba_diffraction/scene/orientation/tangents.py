@@ -63,16 +63,14 @@ def _length_of_breaks(places: Real, faces: Whole, crossed: Bools, jumps: Whole) 
     # edges that follow each other share a corner
     n = len(places)
     graph = coo_array((np.ones(len(edges)), tuple(edges.T)), shape=(n, n))
-    count, of_place = connected_components(graph, directed=False)
-    part = of_place[edges[:, 0]]
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    longest = np.zeros(count)
+    of_place = connected_components(graph, directed=False)[1]
+    parts, part = np.unique(of_place[edges[:, 0]], return_inverse=True)
+    low, high = np.full((len(parts), 3), np.inf), np.full((len(parts), 3), -np.inf)
+    longest = np.zeros(len(parts))
     np.minimum.at(low, part, middles)
     np.maximum.at(high, part, middles)
     np.maximum.at(longest, part, sizes)
-    used = longest > 0
-    extent = np.zeros(count)
-    extent[used] = np.linalg.norm(high[used] - low[used], axis=1)
+    extent = np.linalg.norm(high - low, axis=1)
     size = float(np.ptp(places[faces].reshape(-1, 3), axis=0).max())
     line = extent > np.minimum(_EDGES * longest, _SHARE * size)
 

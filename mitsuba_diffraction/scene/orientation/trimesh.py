@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,22 +109,10 @@ def _shared(normals: Real, places: Whole) -> Real:
     return total
 
 
-class TextureTangents(NamedTuple):
-    """Tangents of triangles by their texture coordinates.
+def texture_tangents(sides: Real, uv_sides: Real) -> tuple[Real, Real, Real]:
+    """Return dp/du and dp/dv (m, 3) of triangles, and their signed areas (m,) in (u, v).
 
-    Attributes
-    ----------
-    dp_du, dp_dv : (m, 3).
-    area : (m,) signed areas in (u, v).
-    """
-
-    dp_du: Real
-    dp_dv: Real
-    area: Real
-
-
-def texture_tangents(sides: Real, uv_sides: Real) -> TextureTangents:
-    """Return the tangents of triangles from two sides of each, in space and in (u, v).
+    sides, uv_sides : (m, 2, 3), (m, 2, 2) two sides of each, in space and in (u, v).
 
     Solves sides = uv_sides · (dp/du, dp/dv); where (u, v) span no area the result is zero.
     """
@@ -134,7 +121,7 @@ def texture_tangents(sides: Real, uv_sides: Real) -> TextureTangents:
     safe = np.where(determinant == 0, np.inf, determinant)[:, None]
     dp_du = (dv1[:, None] * sides[:, 0] - dv0[:, None] * sides[:, 1]) / safe
     dp_dv = (du0[:, None] * sides[:, 1] - du1[:, None] * sides[:, 0]) / safe
-    return TextureTangents(dp_du, dp_dv, determinant / 2)
+    return dp_du, dp_dv, determinant / 2
 
 
 def oriented_mesh(

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.orientation.directions import GUIDES, direction_field
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import (
     TriangleMesh,
@@ -122,19 +122,6 @@ def test_mitsuba_lays_the_patch_along_the_field(own_uv: bool, tmp_path: Path) ->
     cosine = (found * expected).sum(axis=1)[hit] / np.linalg.norm(found[hit], axis=1)
     # 2 % of the 20° that it turns by from corner to corner elsewhere
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.4
-
-
-def test_what_is_oriented_is_usable_and_reads_back(tmp_path: Path) -> None:
-    positions, normals, faces = ring()
-    field = direction_field(positions, normals, faces)
-    mesh = oriented_mesh(positions, normals, faces, field.directions)
-    report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces)
-    assert report.usable
-    assert report.problems() == []
-    assert report.stretch == pytest.approx(1)
-    write_ply(tmp_path / "ring.ply", mesh)
-    again = load_mesh(tmp_path / "ring.ply")
-    np.testing.assert_allclose(again[0], mesh.positions, atol=1e-6)
 
 
 @given(

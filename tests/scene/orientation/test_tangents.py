@@ -185,6 +185,14 @@ def test_vertices_of_no_triangle_are_left_out(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read.orientation, turns)
 
 
+def test_other_attributes_may_have_any_name(tmp_path: Path) -> None:
+    positions, normals, uv, faces = _sheet(2)
+    turns = np.tile([0.0, 1.0], (len(positions), 1))
+    write_ply(file := tmp_path / "a.ply", TriangleMesh(positions, normals, uv, faces, turns))
+    file.write_bytes(file.read_bytes().replace(b"float t\n", b"float \xe9_0\n"))  # not UTF-8
+    np.testing.assert_array_equal(read_mesh(file).orientation, turns)
+
+
 def test_arrays_that_do_not_fit_are_refused() -> None:
     positions, normals, uv, faces = _sheet(2)
     with pytest.raises(DiffractionError, match="'uv' has shape"):
@@ -201,15 +209,14 @@ def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
     corners = [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 2)]
     polygons = [(0, 1, 2, 3), (0, 1, 2, 4, 3)]
     kind = {"ascii": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
-    extra = "" if order == "ascii" else "property uchar red\n"
     header = (
         f"ply\nformat {kind} 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
-        f"property double z\nelement face 2\n{extra}property list uchar int vertex_indices\n"
-        "end_header\n"
+        "property double z\nelement face 2\nproperty uchar red\nproperty list uchar int "
+        "vertex_indices\nend_header\n"
     ).encode()
     if order == "ascii":
         rows = [" ".join(map(str, [*corner, 0])) for corner in corners]
-        rows += [" ".join(map(str, [len(p), *p])) for p in polygons]
+        rows += [" ".join(map(str, [7, len(p), *p])) for p in polygons]
         body = "\n".join(rows).encode() + b"\n"
     else:
         body = b"".join(struct.pack(f"{order}ffd", *corner, 0) for corner in corners)
@@ -277,6 +284,8 @@ def test_a_smooth_field_does_not_break(mesh):
     report = report_of(*mesh, "smooth")
     assert report.broken == 0.0
     assert report.usable
+    assert report.problems() == []
+    assert report.stretch == pytest.approx(1)  # of coordinates that are made with the field
 
 
 @pytest.mark.parametrize("cells", [20, 32])
