@@ -162,7 +162,6 @@ def _check_parameters_act(
     file: Path, values: SceneValues, defaults: Mapping[str, str | None]
 ) -> None:
     """Refuse values other than the defaults that only BSDFs read which surfaces on ids replace."""
-    from .additions import FITTED
     from .mesh_materials import split_meshes
     from .surfaces import effective, put_materials
 
@@ -173,7 +172,7 @@ def _check_parameters_act(
         config.unused_parameters = mi.LogLevel.Debug
         given = {name: v for name, v in values.parameters.items() if name != without}
         parsed = mi.parser.parse_file(config, str(file), **given)
-        split_meshes(parsed, values.materials, FITTED)
+        split_meshes(parsed, values.materials)
         if covered:  # without `mesh` there is another one, of other materials
             ids = parsed.id_to_index
             put_materials(parsed, {k: v for k, v in values.materials.items() if k in ids})
@@ -213,7 +212,7 @@ def _instantiated(
 
     known : files that the scene may include.
     """
-    from .additions import FITTED, fit_meshes, put_box_filters, remove_dark_lights
+    from .additions import fit_meshes, put_box_filters, remove_dark_lights
     from .clamping import put_clamp
     from .mesh_materials import split_meshes
     from .nodes import check_nodes
@@ -229,7 +228,7 @@ def _instantiated(
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)
-        of_meshes = split_meshes(state, values.materials, FITTED)
+        of_meshes = split_meshes(state, values.materials)
         fit_meshes(state, Path(folder))
         edits = put_materials(state, values.materials, of_meshes)
         edits += put_surface_parameters(state, values.surface)

@@ -267,6 +267,7 @@ def pigmented(file: Path) -> None:
     mi.load_dict(md.bsdf_dict(flat, material="keratin", pigment=str(file)))
 
 
+@pytest.mark.usefixtures("some_variant")
 @pytest.mark.parametrize("name", SECRETS)
 @pytest.mark.parametrize("part", ["buffers", "images"])
 def test_gltf_reads_files_of_its_own_folder_alone(folder: Path, part: str, name: str) -> None:
@@ -283,6 +284,7 @@ def test_gltf_reads_files_of_its_own_folder_alone(folder: Path, part: str, name:
         read(file)
 
 
+@pytest.mark.usefixtures("some_variant")
 def test_pictures_in_gltf_run_no_program(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
     monkeypatch.setattr(EpsImagePlugin, "Ghostscript", lambda *a, **k: calls.append(a))
