@@ -200,7 +200,7 @@ def _mesh(file: Path) -> dict[str, Any]:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
     with mitsuba_warnings():
         read = read_mesh(file)
-        mesh, report = read.mesh, check_tangents(*read.mesh, read.orientation)
+        mesh, report = read.mesh, check_tangents(read.mesh)
     summary = report.summary()
     try:
         fit: Any = fit_of(mesh.positions, file).summary()

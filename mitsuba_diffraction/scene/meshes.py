@@ -31,15 +31,6 @@ class MeshArrays(NamedTuple):
     materials: Whole | None = None
 
 
-class SmoothMesh(NamedTuple):
-    """Arrays of a triangle mesh that has normals; see `MeshArrays`."""
-
-    positions: Real
-    normals: Real
-    uv: Real | None
-    faces: Whole
-
-
 def mesh_arrays(mesh: Any) -> MeshArrays:
     """Read the arrays of a `mi.Mesh`, with one row for each vertex or face.
 

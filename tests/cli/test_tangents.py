@@ -81,11 +81,10 @@ def test_a_turn_is_counter_clockwise_from_outside(run, ball):
     """Along z, turned by a right angle, the patch's x axis points west: −φ, as z × n is east."""
     out = ball.with_name("field.ply")
     assert run("tangents", ball, "-o", out, "--along", "z", "--rotate", "90").code == 0
-    positions, _, uv, faces = load_mesh(out)
-    sides = positions[faces[:, 1:]] - positions[faces[:, :1]]
-    uv_sides = uv[faces[:, 1:]] - uv[faces[:, :1]]
-    along = texture_tangents(sides, uv_sides)[0]
-    middle = positions[faces].mean(axis=1)
+    mesh = load_mesh(out)
+    corners, uv = mesh.positions[mesh.faces], mesh.uv[mesh.faces]
+    along = texture_tangents(corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1])[0]
+    middle = corners.mean(axis=1)
     west = np.cross(middle, [0.0, 0.0, 1.0])
     near = np.linalg.norm(west, axis=1) > 0.5
     cosine = (along * west).sum(axis=1) / np.linalg.norm(along, axis=1)
@@ -102,8 +101,8 @@ def test_texture_coordinates_are_kept(run, tmp_path):
     write_ply(tmp_path / "in.ply", TriangleMesh(positions, normals, uv, faces))
     ran = run("tangents", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "--along", "x")
     assert "texture coordinates kept" in ran.out
-    got, _, got_uv, _ = load_mesh(tmp_path / "out.ply")
-    np.testing.assert_allclose(got_uv, got[:, 1::-1] * 3, atol=1e-6)
+    got = load_mesh(tmp_path / "out.ply")
+    np.testing.assert_allclose(got.uv, got.positions[:, 1::-1] * 3, atol=1e-6)
     mesh = mi.load_dict({"type": "ply", "filename": str(tmp_path / "out.ply")})
     turn = np.array(mi.traverse(mesh)["vertex_orientation"]).reshape(-1, 3)
     # from y, where dp/du points, to x

@@ -13,13 +13,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Real, Whole
+from ...arrays import Whole
 from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
 from ..load import with_relative_indices
-from ..meshes import SmoothMesh, mesh_arrays
+from ..meshes import mesh_arrays
 from .interchange import fans, interchange_mesh
 from .mesh_indices import FORMATS, any_line_begins, check_mesh, ply_header
 from .trimesh import TriangleMesh, vertex_normals
@@ -38,16 +38,15 @@ class MeshFile(NamedTuple):
     Attributes
     ----------
     file : the file.
-    mesh : the triangles, with the vertices that they name.
+    mesh : the triangles, with the vertices that they name; its orientation is the attribute
+        vertex_orientation.
     own_normals : whether the file holds vertex normals; otherwise `vertex_normals` has made them.
-    orientation : (n, 2) of the attribute vertex_orientation, or None.
     materials : (m,) number of each triangle's material in a glTF file; None for other files.
     """
 
     file: Path
-    mesh: SmoothMesh
+    mesh: TriangleMesh
     own_normals: bool
-    orientation: Real | None
     materials: Whole | None
 
 
@@ -86,11 +85,11 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
         None if rows is None else rows[named] for rows in (arrays.normals, arrays.uv, turns)
     )
     normals = vertex_normals(positions, faces, uv) if own is None else own
-    mesh = SmoothMesh(positions, normals, uv, faces)
-    return MeshFile(file, mesh, own is not None, turns, arrays.materials)
+    mesh = TriangleMesh(positions, normals, uv, faces, turns)
+    return MeshFile(file, mesh, own is not None, arrays.materials)
 
 
-def load_mesh(path: str | os.PathLike[str]) -> SmoothMesh:
+def load_mesh(path: str | os.PathLike[str]) -> TriangleMesh:
     """Return the triangles of `read_mesh`."""
     return read_mesh(path).mesh
 
@@ -131,9 +130,7 @@ def _load(file: Path, **options: bool) -> mi.Mesh:
         ) from error
 
 
-def write_ply(
-    path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "", *, with_uv: bool = True
-) -> None:
+def write_ply(path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "") -> None:
     """Write a binary PLY, with the names of properties that Mitsuba writes.
 
     An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
@@ -142,7 +139,7 @@ def write_ply(
     Raises a DiffractionError if the file cannot be written.
     """
     blocks = {"x y z": mesh.positions, "nx ny nz": mesh.normals}
-    if with_uv:
+    if mesh.uv is not None:
         blocks["s t"] = mesh.uv
     if mesh.orientation is not None:
         turn = ORIENTATION.removeprefix("vertex_")

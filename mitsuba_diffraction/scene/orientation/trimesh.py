@@ -20,12 +20,12 @@ _MOST_AT_ONE_PLACE = 64
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Vertices with normals and texture coordinates, and the triangles between them."""
+    """Vertices with normals and mostly texture coordinates, and the triangles between them."""
 
     # positions, normals: (n, 3) floats; normals are unit vectors
     positions: Real
     normals: Real
-    uv: Real  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
+    uv: Real | None  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
     faces: Whole  # (m, 3) integers, counter-clockwise seen from outside
     # (n, 2) floats or None Cosine and sine of the angle by which the patch is turned away from
     # dp/du
@@ -48,8 +48,8 @@ class TriangleMesh:
     def part(self, chosen: NDArray[np.bool_]) -> TriangleMesh:
         """Return the mesh of some triangles, (m,), with their vertices alone."""
         kept, faces = np.unique(self.faces[chosen], return_inverse=True)
-        turns = None if self.orientation is None else self.orientation[kept]
-        positions, normals, uv = self.positions[kept], self.normals[kept], self.uv[kept]
+        uv, turns = (None if a is None else a[kept] for a in (self.uv, self.orientation))
+        positions, normals = self.positions[kept], self.normals[kept]
         return TriangleMesh(positions, normals, uv, faces.reshape(-1, 3), turns)
 
 

@@ -178,7 +178,7 @@ def test_a_piece_is_the_back_of_a_snake() -> None:
     mesh: TriangleMesh = piece(scales=Scales(detail=2, turn=-90.0), columns=4, rows=7)
     assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1)
     assert mesh.normals[:, 2].mean() > 0.8
-    report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces)
+    report = check_tangents(mesh)
     assert report.usable
     pitch = 2 * 0.74 / 18 * 1.25  # circumferences
     # the cells that the cut goes through, of 1.22 / 4 pitches, are left out at both ends

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.scene.orientation.directions import direction_field
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
 from tests.support import ROOT
@@ -44,7 +45,7 @@ def _sheet(n: int = 8) -> Arrays:
 
 
 def test_a_plain_sheet_is_fine() -> None:
-    report = check_tangents(*_sheet())
+    report = check_tangents(TriangleMesh(*_sheet()))
     assert report.usable
     assert report.problems() == []
     assert report.triangles == 128
@@ -54,7 +55,7 @@ def test_a_plain_sheet_is_fine() -> None:
 
 def test_without_texture_coordinates_there_is_no_direction() -> None:
     positions, normals, _, faces = _sheet()
-    report = check_tangents(positions, normals, None, faces)
+    report = check_tangents(TriangleMesh(positions, normals, None, faces))
     assert not report.usable
     assert len(report.problems()) == 1
     assert "no texture coordinates" in report.problems()[0]
@@ -63,7 +64,7 @@ def test_without_texture_coordinates_there_is_no_direction() -> None:
 def test_collapsed_texture_coordinates_are_named() -> None:
     positions, normals, uv, faces = _sheet()
     uv[positions[:, 0] > 0.7] = 0.5
-    report = check_tangents(positions, normals, uv, faces)
+    report = check_tangents(TriangleMesh(positions, normals, uv, faces))
     # two columns of cells, and one triangle of each cell in the column before
     assert report.degenerate == pytest.approx(2.5 / 8)
     assert not report.usable
@@ -73,7 +74,7 @@ def test_collapsed_texture_coordinates_are_named() -> None:
 def test_a_mirrored_half_is_named() -> None:
     positions, normals, uv, faces = _sheet()
     uv[:, 1] = np.abs(uv[:, 1] - 0.5)
-    report = check_tangents(positions, normals, uv, faces)
+    report = check_tangents(TriangleMesh(positions, normals, uv, faces))
     assert report.mirrored == pytest.approx(0.5)
     assert any("mirrored" in line for line in report.problems())
 
@@ -82,7 +83,7 @@ def test_coordinates_that_are_mirrored_everywhere_are_no_problem() -> None:
     """As those of OBJ files, of which Mitsuba flips v."""
     positions, normals, uv, faces = _sheet()
     uv[:, 1] = 1.0 - uv[:, 1]
-    report = check_tangents(positions, normals, uv, faces)
+    report = check_tangents(TriangleMesh(positions, normals, uv, faces))
     assert report.mirrored == 0
     assert not report.problems()
 
@@ -108,12 +109,12 @@ def test_normals_without_length_are_rebuilt_with_a_note(tmp_path, some_variant, 
 def test_stretch_is_the_ratio_of_the_tangents() -> None:
     positions, normals, uv, faces = _sheet()
     uv[:, 0] /= 3
-    assert check_tangents(positions, normals, uv, faces).stretch == pytest.approx(3)
+    assert check_tangents(TriangleMesh(positions, normals, uv, faces)).stretch == pytest.approx(3)
 
 
 @pytest.mark.parametrize("name", ["elaphe", "xenopeltis"])
 def test_the_snakes_are_usable(name: str) -> None:
-    report = check_tangents(*load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply"))
+    report = check_tangents(load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply"))
     assert report.usable
     assert report.problems() == []
 
@@ -164,11 +165,16 @@ def test_any_bytes_after_a_ply_header_are_read_or_refused(
     assert "\n" not in str(caught.value)
 
 
+def arrays_of(mesh: TriangleMesh) -> tuple[Any, ...]:
+    """Its arrays but the orientation."""
+    return mesh.positions, mesh.normals, mesh.uv, mesh.faces
+
+
 def test_a_written_mesh_reads_back(tmp_path: Path) -> None:
     positions, normals, uv, faces = _sheet(2)
     write_ply(tmp_path / "sheet.ply", TriangleMesh(positions, normals, uv, faces), "a sheet")
     read = load_mesh(tmp_path / "sheet.ply")
-    for before, after in zip((positions, normals, uv, faces), read, strict=True):
+    for before, after in zip((positions, normals, uv, faces), arrays_of(read), strict=True):
         np.testing.assert_array_equal(before, after)
 
 
@@ -179,8 +185,8 @@ def test_vertices_of_no_triangle_are_left_out(tmp_path: Path) -> None:
     arrays = (np.insert(a, 3, 1000.0, axis=0) for a in (positions, normals, uv))
     mesh = TriangleMesh(*arrays, faces + (faces >= 3), np.insert(turns, 3, 0.5, axis=0))
     write_ply(tmp_path / "sheet.ply", mesh)
-    read = read_mesh(tmp_path / "sheet.ply")
-    for before, after in zip((positions, normals, uv, faces), read.mesh, strict=True):
+    read = load_mesh(tmp_path / "sheet.ply")
+    for before, after in zip((positions, normals, uv, faces), arrays_of(read), strict=True):
         np.testing.assert_array_equal(before, after)
     np.testing.assert_array_equal(read.orientation, turns)
 
@@ -190,7 +196,7 @@ def test_other_attributes_may_have_any_name(tmp_path: Path) -> None:
     turns = np.tile([0.0, 1.0], (len(positions), 1))
     write_ply(file := tmp_path / "a.ply", TriangleMesh(positions, normals, uv, faces, turns))
     file.write_bytes(file.read_bytes().replace(b"float t\n", b"float \xe9_0\n"))  # not UTF-8
-    np.testing.assert_array_equal(read_mesh(file).orientation, turns)
+    np.testing.assert_array_equal(load_mesh(file).orientation, turns)
 
 
 def test_arrays_that_do_not_fit_are_refused() -> None:
@@ -226,7 +232,7 @@ def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
     (tmp_path / "polygons.ply").write_bytes(header + body)
     obj_of(tmp_path / "polygons.obj", [(x, y, 0.0) for x, y in corners], polygons)
     ours, theirs = (load_mesh(tmp_path / f"polygons.{kind}") for kind in ("ply", "obj"))
-    np.testing.assert_array_equal(ours[0][ours[3]], theirs[0][theirs[3]])
+    np.testing.assert_array_equal(ours.positions[ours.faces], theirs.positions[theirs.faces])
     # cut short, it is refused as any damaged file
     (tmp_path / "short.ply").write_bytes((header + body)[:-8])
     with pytest.raises(DiffractionError, match="cannot be read"):
@@ -253,7 +259,7 @@ def report_of(positions, normals, faces, along, smoothing=0.03):
     """What is found on a mesh that `tangents` makes."""
     field = direction_field(positions, normals, faces, along, smoothing=smoothing)
     mesh = oriented_mesh(positions, normals, faces, field.directions)
-    return check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces, mesh.orientation)
+    return check_tangents(mesh)
 
 
 #: Of a ring.
@@ -301,11 +307,11 @@ def test_a_seam_of_the_texture_is_as_long_however_fine_the_mesh(cells):
     faces[right] += len(positions)  # where u runs along y
     uv = np.concatenate([uv, np.stack([uv[:, 1], -uv[:, 0]], axis=1)])
     two = np.tile(positions, (2, 1)), np.tile(normals, (2, 1))
-    report = check_tangents(*two, uv, faces)
+    report = check_tangents(TriangleMesh(*two, uv, faces))
     assert report.broken == pytest.approx(1.0)
     # one triangle in each cell on both sides of the seam
     assert report.turning == pytest.approx(2 * 0.5 / cells)
     assert not report.usable
     # turned back by the orientation, nothing is left of it
     back = np.repeat([[1.0, 0.0], [0.0, -1.0]], len(positions), axis=0)
-    assert check_tangents(*two, uv, faces, back).usable
+    assert check_tangents(TriangleMesh(*two, uv, faces, back)).usable
