@@ -163,9 +163,10 @@ def hologram(
     turns = np.radians(np.where(lit, angles, 0.0))
     across = np.stack([np.cos(turns), np.sin(turns), np.zeros_like(turns)], axis=-1)
     disc = _disc(dot, values.size)
+    texels, scale = np.ones(disc.shape), np.where(lit, lengths, base) / base
     return Hologram(
-        _enlarged(across, dot),
-        _enlarged(np.where(lit, lengths, base) / base, dot),
+        np.kron(across, texels[..., None]).astype(np.float32),
+        np.kron(scale, texels).astype(np.float32),
         np.kron(lit, disc).astype(np.float32),
         base,
     )
@@ -233,10 +234,6 @@ def _disc(texels: int, dots: int) -> NDArray[np.bool_]:
         raise DiffractionError(f"hologram: dot={texels} must be a whole number from 1 to {most}")
     offset = (np.arange(texels) + 0.5) / texels - 0.5
     return np.hypot(*np.meshgrid(offset, offset)) <= 0.5 if texels > 1 else np.ones((1, 1), bool)
-
-
-def _enlarged(values: NDArray[np.float64], texels: int) -> Single:
-    return values.repeat(texels, axis=0).repeat(texels, axis=1).astype(np.float32)
 
 
 def _texture(values: Single) -> dict[str, Any]:

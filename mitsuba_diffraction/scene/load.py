@@ -32,7 +32,7 @@ from .bands import SensorBands, check_bands, put_bands, warn_of_dark_bands, wide
 from .elements import check_attributes, name_of, surfaces_within
 from .meshes import has_texcoords
 from .orbit import turn_cameras
-from .parameters import check_includes, check_parameters, files_of, parameters_of
+from .parameters import check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
@@ -210,7 +210,9 @@ def _instantiated(
 
     Returns the scene, and the changes of its surfaces.
 
-    known : files that the scene may include.
+    known : files that the scene may include, by `files_of`.
+
+    Raises a DiffractionError if Mitsuba reads other files than these.
     """
     from .additions import fit_meshes, put_box_filters, remove_dark_lights
     from .clamping import put_clamp
@@ -224,7 +226,13 @@ def _instantiated(
     config.parallel = False
     with tempfile.TemporaryDirectory() as folder:
         state = mi.parser.parse_file(config, str(file), **values.parameters)
-        check_includes([Path(str(path)) for path in state.files], known)
+        expected = {path.resolve() for path in known}
+        for path in map(Path, map(str, state.files)):
+            if path.resolve() not in expected:  # Mitsuba reads the XML differently than Python
+                raise DiffractionError(
+                    f"'{path}' is included by malformed XML; write <include filename='NAME'/>, "
+                    "without entities of a document type"
+                )
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)

@@ -7,7 +7,7 @@ import difflib
 import os
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -122,23 +122,6 @@ def note_files(file: Path, values: Mapping[str, str] | None = None) -> None:
     with contextlib.suppress(DiffractionError):
         for named in files_of(file, values):
             note_input(named)
-
-
-def check_includes(files: Iterable[Path], known: Iterable[Path]) -> None:
-    """Refuse a scene of which Mitsuba has read other files than `files_of` lists.
-
-    files : scene and includes, as Mitsuba has read them.
-    known : by `files_of`.
-
-    Raises a DiffractionError on XML that Mitsuba reads differently than Python.
-    """
-    expected = {file.resolve() for file in known}
-    for file in files:
-        if file.resolve() not in expected:
-            raise DiffractionError(
-                f"'{file}' is included by malformed XML; write <include "
-                "filename='NAME'/>, without entities of a document type"
-            )
 
 
 class _Unreadable(Exception):

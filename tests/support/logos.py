@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from tests.support.meshes import obj_of, ply_of
+from tests.support.meshes import obj_of, ply_text
 
 #: Colours of the logo, most frequent first.
 COLOURS = ((230, 60, 40), (250, 210, 40), (40, 80, 200))
@@ -62,7 +62,7 @@ def write_board(file: Path, turn: int = 0, *, with_uv: bool = True) -> None:
         mesh = trimesh.Trimesh(table[:, :3], faces, visual=visual, process=False)
         trimesh.Scene(mesh).export(file)
         return
-    ply_of(file, rows, faces, "xyzst")
+    file.write_text(ply_text(rows, faces, "xyzst"))
 
 
 RED = [0.8, 0.1, 0.1]

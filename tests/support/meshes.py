@@ -69,11 +69,11 @@ def obj_of(
     path.write_text("\n".join([*(" ".join(map(str, row)) for row in rows), ""]))
 
 
-def ply_of(path: Path, vertices: ArrayLike, polygons: Sequence[Sequence[int]], names: str) -> None:
-    """Write a PLY in text, whose vertices have numbers of these names, a letter each."""
+def ply_text(vertices: ArrayLike, polygons: Sequence[Sequence[int]], names: Sequence[str]) -> str:
+    """Return a PLY in text, whose vertices have numbers of these names."""
     rows = np.asarray(vertices).tolist()
     header = ["ply", "format ascii 1.0", f"element vertex {len(rows)}"]
     header += [f"property float {name}" for name in names]
     header += [f"element face {len(polygons)}", "property list uchar int vertex_indices"]
     rows += [[len(polygon), *polygon] for polygon in polygons]
-    path.write_text("\n".join([*header, "end_header", *(" ".join(map(str, r)) for r in rows), ""]))
+    return "\n".join([*header, "end_header", *(" ".join(map(str, row)) for row in rows), ""])

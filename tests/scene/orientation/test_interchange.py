@@ -19,7 +19,7 @@ from mitsuba_diffraction.scene.fitted_mesh import fit_of
 from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mesh
 from mitsuba_diffraction.scene.orientation.trimesh import grid_faces
 from tests.support.hostile import postscript
-from tests.support.meshes import obj_of, ply_of
+from tests.support.meshes import obj_of, ply_text
 
 # a bent sheet, of which no axis and no side looks like another
 U, V = (g.ravel() for g in np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1, 3), indexing="ij"))
@@ -162,7 +162,7 @@ def write_cube(file: Path) -> None:
     elif file.suffix == ".obj":  # each polygon has corners of its own
         obj_of(file, np.array(CORNERS)[SIDES].reshape(-1, 3), np.arange(24).reshape(6, 4))
     else:
-        ply_of(file, CORNERS, SIDES, "xyz")
+        file.write_text(ply_text(CORNERS, SIDES, "xyz"))
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".ply", ".obj"])
