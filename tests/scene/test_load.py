@@ -48,6 +48,11 @@ CASES = {
         "'a.xml', line 2: shape 'ply': '/m/ball.obj' is not a PLY mesh, which the scene expects: "
         "run the command 'tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
     ),
+    '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "obj": '
+    '[OBJMesh] Error while loading OBJ file "a.obj": reference to invalid vertex 4294967293!': (
+        "'a.xml', line 2: shape 'obj': Error while loading OBJ file \"a.obj\": it names vertex -3, "
+        "counted back from the last, which Mitsuba does not read"
+    ),
     # quads, in binary and as text
     '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
     '[PLYMesh] Error while loading PLY file "q.ply": incompatible contents -- is this a triangle '
