@@ -250,7 +250,11 @@ def _place(stream: Any, size: int, number: int) -> tuple[int, int]:
     stream.seek(size - 4)
     (count,) = struct.unpack("<I", stream.read(4))
     width, code = (8, "<Q") if version == 4 else (4, "<I")
-    if number >= count:
+    place = size - 4 - width * (count - number)
+    if number >= count or place < 0:
         raise ValueError
-    stream.seek(size - 4 - width * (count - number))
-    return struct.unpack(code, stream.read(width))[0] + 4, version
+    stream.seek(place)
+    (start,) = struct.unpack(code, stream.read(width))
+    if start >= size:
+        raise ValueError
+    return start + 4, version
