@@ -30,7 +30,7 @@ from ..plugin import installed
 from ..system import memory
 from .bands import SensorBands, check_bands, put_bands, warn_of_dark_bands, wider_tables
 from .elements import check_attributes, name_of, surfaces_within
-from .meshes import has_texcoords
+from .meshes import has_texcoords, with_relative_indices
 from .orbit import turn_cameras
 from .parameters import check_parameters, files_of, parameters_of
 
@@ -54,8 +54,6 @@ _NO_PLY = re.compile(
     r'Error while loading PLY file "(?P<file>[^"]+)": (?:"[^"]+": )?'
     r"(?P<why>(?:invalid PLY|incompatible contents|trailing tokens) .*)"
 )
-# an index of an OBJ file below 0, to which Mitsuba adds 2^32
-_RELATIVE = re.compile(r"reference to invalid (vertex|normal|texture coordinate) ([2-4]\d{9})\b")
 _UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
 _PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
 # mi.load_file's own arguments: a scene parameter of that name could not be passed.
@@ -382,17 +380,6 @@ def error_of(failed: str, error: BaseException) -> BaseException:
     if original[1] == "SystemExit":
         return SystemExit(int(original[2] or 1))
     return KeyboardInterrupt() if original[1] == "KeyboardInterrupt" else MemoryError()
-
-
-def with_relative_indices(text: str) -> str:
-    """Show the indices below 0 of an OBJ file in a message of Mitsuba's as the file has them."""
-    return _RELATIVE.sub(
-        lambda match: (
-            f"it names {match[1]} {int(match[2]) - (1 << 32)}, counted back from the "
-            "last, which Mitsuba does not read"
-        ),
-        text,
-    )
 
 
 def _words(error: BaseException) -> str:

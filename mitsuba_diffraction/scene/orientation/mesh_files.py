@@ -18,8 +18,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..load import with_relative_indices
-from ..meshes import mesh_arrays
+from ..meshes import mesh_arrays, with_relative_indices
 from .interchange import fans, interchange_mesh
 from .mesh_indices import FORMATS, any_line_begins, check_mesh, ply_header
 from .trimesh import TriangleMesh, vertex_normals
