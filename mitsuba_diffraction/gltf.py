@@ -7,7 +7,6 @@ import io
 import json
 import struct
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -66,7 +65,7 @@ class _Folder:
         self._file = file
         self.refused: DiffractionError | None = None  # `trimesh` ignores errors of pictures
 
-    def get(self, name: str) -> bytes:
+    def __getitem__(self, name: str) -> bytes:
         """Return the content of a file beside the glTF file."""
         try:
             path = path_beside(self._file, unquote(name))
@@ -76,20 +75,11 @@ class _Folder:
             raise
         return read_bytes(path)
 
-    __getitem__ = get
 
-    def size_of(self, document: dict[str, Any]) -> int:
-        """Return the bytes of the files that hold the buffers of a document."""
-        names = {str(buffer.get("uri", "data:")) for buffer in document.get("buffers", [])}
-        return sum(
-            path_beside(self._file, unquote(name)).stat().st_size
-            for name in names
-            if not name.startswith("data:")
-        )
-
-    def keys(self) -> Iterator[str]:
-        """Yield no names: glTF files name all that they need."""
-        return iter(())
+def _names(document: dict[str, Any], *kinds: str) -> list[str]:
+    """Return the names of the files of a document's items, such as buffers, each once."""
+    uris = (str(item.get("uri", "data:")) for kind in kinds for item in document.get(kind, ()))
+    return [unquote(uri) for uri in dict.fromkeys(uris) if not uri.startswith("data:")]
 
 
 def named_files(file: Path) -> list[Path]:
@@ -101,11 +91,9 @@ def named_files(file: Path) -> list[Path]:
     if file.suffix.lower() not in GLTF:
         return found
     with contextlib.suppress(ValueError, LookupError, TypeError, AttributeError):
-        document, _ = _parts(file)
-        for item in (*document.get("buffers", ()), *document.get("images", ())):
-            if not (name := str(item.get("uri", "data:"))).startswith("data:"):
-                with contextlib.suppress(DiffractionError):
-                    found.append(path_beside(file, unquote(name)))
+        for name in _names(_parts(file)[0], "buffers", "images"):
+            with contextlib.suppress(DiffractionError):
+                found.append(path_beside(file, name))
     return found
 
 
@@ -158,7 +146,8 @@ def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
     trimesh = optional("trimesh", wanted_by)
     document, rest = _parts(file)
     size, folder = file.stat().st_size, _Folder(file)
-    _check(document, size + folder.size_of(document), f"'{file}'")
+    buffers = sum(path_beside(file, name).stat().st_size for name in _names(document, "buffers"))
+    _check(document, size + buffers, f"'{file}'")
     _check_encoding(document, f"'{file}'")
     if not materials:  # `trimesh` decodes pictures of some, and keeps UV only beside a material
         document["materials"] = [{} for _ in range(len(document.get("materials", ())) + 1)]

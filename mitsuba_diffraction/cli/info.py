@@ -181,7 +181,7 @@ def _mesh(file: Path) -> dict[str, Any]:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
     with mitsuba_warnings():
         read = read_mesh(file)
-        mesh, report = read.mesh, check_tangents(*read.mesh, read.orientation)
+        mesh, report = read.mesh, check_tangents(read.mesh)
     materials = {}
     if file.suffix.lower() in GLTF:  # names that --preset and --assign take
         materials["materials"] = [each.name for each in materials_of(file)] or ["none"]

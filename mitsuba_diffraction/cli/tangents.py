@@ -48,18 +48,19 @@ def run(args: argparse.Namespace) -> Figures:
 
     with Bar(args) as bar, mitsuba_warnings():
         bar(0, 0, "reading")
-        positions, normals, uv, faces = load_mesh(args.mesh)
+        read = load_mesh(args.mesh)
+        arrays = read.positions, read.normals, read.faces
         bar(0, 0, "solving for the field")
-        field = direction_field(positions, normals, faces, args.along, smoothing=args.smoothing)
-        directions = turned(field.directions, normals, args.rotate)
-        mesh = oriented_mesh(positions, normals, faces, directions, uv)
+        field = direction_field(*arrays, args.along, smoothing=args.smoothing)
+        directions = turned(field.directions, read.normals, args.rotate)
+        mesh = oriented_mesh(*arrays, directions, read.uv)
         bar(0, 0, "writing")
         write_ply(args.output, mesh, f"{args.mesh.name}, patch along {args.along}")
     print(
         f"{args.output}: {counted(len(mesh.faces), 'triangle')}, patch along {args.along}, "
-        f"{'texture coordinates kept' if uv is not None else 'had no texture coordinates'}"
+        f"{'texture coordinates kept' if read.uv is not None else 'had no texture coordinates'}"
     )
-    report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces, mesh.orientation)
+    report = check_tangents(mesh)
     print(_places(field.singular, field.indices, report))
     print(
         'in the scene: <texture type="mesh_attribute" name="orientation"><string name="name" '

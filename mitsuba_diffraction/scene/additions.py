@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
-from .mesh_materials import OWN, PART, own_bsdf
+from .mesh_materials import FITTED, OWN, PART, own_bsdf
 from .orbit import ORBIT
 from .orientation.mesh_files import read_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
 from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
 
-#: Shape that is put on the stage.
-FITTED = "fitted_mesh"
 #: Scene parameter that limits samples, in units of white.
 CLAMP = "render:clamp"
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
@@ -29,8 +30,6 @@ def denoised(scene: Any, sensor: Any, picture: Any, spp: int, seed: int) -> Any:
     Returns a `mi.Bitmap` of linear sRGB. Raises a DiffractionError if pyoidn is not installed, or
     the picture holds no colours.
     """
-    import mitsuba as mi
-
     denoiser = optional("pyoidn")
     colours = colours_of(picture)
     if colours is None:

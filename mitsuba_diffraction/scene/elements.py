@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError, counted
@@ -44,19 +45,14 @@ def name_of(element: Any, number: int | None = None) -> str:
     if file:
         kind = f"the mesh {Path(file[1]).name}"
     else:
-        kind = f"{_with_article(element.class_name())} without id"
+        words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", element.class_name()).lower()
+        kind = f"{'an' if words[:1] in 'aeiou' else 'a'} {words} without id"
     return kind if number is None else f"shape {number + 1} ({kind})"
 
 
 def own_id(name: str) -> str:
     """Return the id that the scene gives, empty if Mitsuba made it up."""
     return "" if name.startswith(_UNNAMED) else name
-
-
-def _with_article(kind: str) -> str:
-    """`AreaLight` as "an area light"."""
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind).lower()
-    return f"{'an' if words[:1] in 'aeiou' else 'a'} {words}"
 
 
 def surfaces_text(scene: Any) -> str:
@@ -104,7 +100,7 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
     attributes = [name for part in parts_of(shape.bsdf()) if (name := _attribute(part))]
     for name in dict.fromkeys(attributes):
         if np.all(shape.has_attribute(name)):
-            if name in stretching and (least := _least(shape, name)) <= 0.0:
+            if name in stretching and (least := np.array(mi.traverse(shape)[name]).min()) <= 0.0:
                 raise DiffractionError(
                     f"{name_of(shape, number)}: lateral_scale reads the attribute {name}, whose "
                     f"least number is {least:g}; factors must be above 0"
@@ -127,10 +123,3 @@ def _attribute(thing: Any) -> str:
     match = _ATTRIBUTE.search(str(thing))
     assert match is not None
     return match[1]
-
-
-def _least(shape: Any, name: str) -> float:
-    """Return the least number of a mesh attribute."""
-    import mitsuba as mi
-
-    return float(np.array(mi.traverse(shape)[name]).min())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -106,18 +107,16 @@ def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> Triang
 
     Raises a DiffractionError if the mesh does not fit.
     """
-    positions, normals, uv, faces = read.mesh
-    placed = fit_of(positions, read.file, up)
-    orientation = read.orientation
-    if orientation is None and check_tangents(*read.mesh).usable:
-        orientation = np.tile([1.0, 0.0], (len(positions), 1))
+    mesh, placed = read.mesh, fit_of(read.mesh.positions, read.file, up)
+    if mesh.orientation is None and check_tangents(mesh).usable:
+        mesh = replace(mesh, orientation=np.tile([1.0, 0.0], (len(mesh.positions), 1)))
     if fit:
-        positions = placed.scale * (positions @ placed.rotation.T) + placed.shift
-        normals = normals @ placed.rotation.T
-    if orientation is not None and uv is not None:
-        return TriangleMesh(positions, normals, uv, faces, orientation)
-    field = direction_field(positions, normals, faces)
-    return oriented_mesh(positions, normals, faces, field.directions, uv)
+        positions = placed.scale * (mesh.positions @ placed.rotation.T) + placed.shift
+        mesh = replace(mesh, positions=positions, normals=mesh.normals @ placed.rotation.T)
+    if mesh.orientation is not None and mesh.uv is not None:
+        return mesh
+    field = direction_field(mesh.positions, mesh.normals, mesh.faces)
+    return oriented_mesh(mesh.positions, mesh.normals, mesh.faces, field.directions, mesh.uv)
 
 
 def framing(positions: Real, camera: Real, tangents: tuple[float, float]) -> Real:

@@ -16,6 +16,7 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError, counted, warn
 from ..extras import optional
 from ..files import refuse_pipe
+from ..images import open_image
 from ..progress import Progress
 from .denoise import denoised
 from .load import check_values, load_scene, preview_samples, sensor_of
@@ -163,8 +164,6 @@ def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
 
     Raises a DiffractionError if the film cannot be written.
     """
-    from ..images import open_image
-
     if film.suffix.lower() == ".mp4":
         _write_mp4(frames, film, fps)
         return
@@ -196,8 +195,6 @@ def check_film(film: Path) -> None:
 
 def _write_mp4(frames: Sequence[Path], film: Path, fps: float) -> None:
     """Join PNG files to an MP4; pictures of odd size lose a row or a column, as H.264 requires."""
-    from ..images import open_image
-
     ffmpeg = optional("imageio_ffmpeg")
     with open_image(frames[0], ("PNG",)) as first:
         width, height = (max(2, length - length % 2) for length in first.size)
@@ -236,8 +233,6 @@ def digest_of(scene: Path, values: Mapping[str, str]) -> str:
 
 def _settings_in(png: Path) -> dict[str, Any] | None:
     """Read the settings that a frame was written with; None for files of another kind."""
-    from ..images import open_image
-
     try:
         with open_image(png, ("PNG",)) as image:
             text = getattr(image, "text", {}).get(_KEY, "")

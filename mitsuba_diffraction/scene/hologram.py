@@ -21,6 +21,7 @@ from ..arrays import Single
 from ..atomic import atomic_path
 from ..errors import DiffractionError, quoted
 from ..images import read_picture
+from ..plugin.memory import tensor
 from ..tables import write_channels
 
 #: Quantity of the dots: of each label, from black to white, at each dot, or of all.
@@ -162,9 +163,10 @@ def hologram(
     turns = np.radians(np.where(lit, angles, 0.0))
     across = np.stack([np.cos(turns), np.sin(turns), np.zeros_like(turns)], axis=-1)
     disc = _disc(dot, values.size)
+    texels, scale = np.ones(disc.shape), np.where(lit, lengths, base) / base
     return Hologram(
-        _enlarged(across, dot),
-        _enlarged(np.where(lit, lengths, base) / base, dot),
+        np.kron(across, texels[..., None]).astype(np.float32),
+        np.kron(scale, texels).astype(np.float32),
         np.kron(lit, disc).astype(np.float32),
         base,
     )
@@ -234,13 +236,6 @@ def _disc(texels: int, dots: int) -> NDArray[np.bool_]:
     return np.hypot(*np.meshgrid(offset, offset)) <= 0.5 if texels > 1 else np.ones((1, 1), bool)
 
 
-def _enlarged(values: NDArray[np.float64], texels: int) -> Single:
-    return values.repeat(texels, axis=0).repeat(texels, axis=1).astype(np.float32)
-
-
 def _texture(values: Single) -> dict[str, Any]:
     """Return a bitmap without interpolation: a mean of two gratings would be a wrong grating."""
-    from ..plugin.memory import tensor
-
-    data = tensor(values)
-    return {"type": "bitmap", "raw": True, "filter_type": "nearest", "data": data}
+    return {"type": "bitmap", "raw": True, "filter_type": "nearest", "data": tensor(values)}

@@ -18,6 +18,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
+import drjit as dr
+import mitsuba as mi
+
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
 from ..heights.lengths import numbers_of
@@ -25,13 +28,14 @@ from ..inputs import note_input
 from ..llvm import require_llvm
 from ..plugin import installed
 from ..system import memory
+from .bands import SensorBands, check_bands, put_bands, warn_of_dark_bands, wider_tables
 from .elements import check_attributes, name_of, surfaces_within
-from .meshes import has_texcoords
-from .parameters import check_includes, check_parameters, files_of, parameters_of
+from .meshes import has_texcoords, with_relative_indices
+from .orbit import turn_cameras
+from .parameters import check_parameters, files_of, parameters_of
 
 if TYPE_CHECKING:
     from .additions import SceneValues
-    from .bands import SensorBands
     from .surfaces import Edit
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
@@ -67,9 +71,6 @@ def set_variant(name: str | None) -> str:
 
     Raises a DiffractionError if there is no such variant, or no device or LLVM for it.
     """
-    import drjit as dr
-    import mitsuba as mi
-
     if name is None:
         name = "cuda" if dr.has_backend(dr.JitBackend.CUDA) else "llvm"
         name += "_ad_spectral"
@@ -105,11 +106,7 @@ def load_scene(
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
-    import mitsuba as mi
-
     from .additions import split_values
-    from .bands import check_bands, warn_of_dark_bands, wider_tables
-    from .orbit import turn_cameras
 
     readable_file(file)
     defaults = parameters_of(file, parameters) or {}
@@ -121,13 +118,10 @@ def load_scene(
     for name in _TAKEN:
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
-    try:
-        serving = contextlib.nullcontext() if bands is None else wider_tables(bands.first)
-        with serving, _files_beside(file):
-            _check_parameters_act(file, values, defaults)
-            scene, edits = _instantiated(file, known, values, box_filter, bands)
-    except (RuntimeError, UnicodeDecodeError) as error:
-        raise error_of("cannot load the scene", error) from error
+    serving = contextlib.nullcontext() if bands is None else wider_tables(bands.first)
+    with serving, _read_by_mitsuba(file):
+        _check_parameters_act(file, values, defaults)
+        scene, edits = _instantiated(file, known, values, box_filter, bands)
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
     # Found inside twosided, blendbsdf and the like, too
@@ -155,26 +149,17 @@ def check_values(file: Path, parameters: Mapping[str, Any]) -> None:
 
     Raises a DiffractionError with the parameter's place in the scene.
     """
-    import mitsuba as mi
-
     from .additions import split_values
 
     values = split_values(parameters, parameters_of(file, parameters) or {})
-    config = mi.parser.ParserConfig(mi.variant())
-    try:
-        with _files_beside(file):
-            mi.parser.parse_file(config, str(file), **values.parameters)
-    except RuntimeError as error:
-        raise error_of("cannot load the scene", error) from error
+    with _read_by_mitsuba(file):
+        mi.parser.parse_file(mi.parser.ParserConfig(mi.variant()), str(file), **values.parameters)
 
 
 def _check_parameters_act(
     file: Path, values: SceneValues, defaults: Mapping[str, str | None]
 ) -> None:
     """Refuse values other than the defaults that only BSDFs read which surfaces on ids replace."""
-    import mitsuba as mi
-
-    from .additions import FITTED
     from .mesh_materials import split_meshes
     from .surfaces import effective, put_materials
 
@@ -185,7 +170,7 @@ def _check_parameters_act(
         config.unused_parameters = mi.LogLevel.Debug
         given = {name: v for name, v in values.parameters.items() if name != without}
         parsed = mi.parser.parse_file(config, str(file), **given)
-        split_meshes(parsed, values.materials, FITTED)
+        split_meshes(parsed, values.materials)
         if covered:  # without `mesh` there is another one, of other materials
             ids = parsed.id_to_index
             put_materials(parsed, {k: v for k, v in values.materials.items() if k in ids})
@@ -223,12 +208,11 @@ def _instantiated(
 
     Returns the scene, and the changes of its surfaces.
 
-    known : files that the scene may include.
-    """
-    import mitsuba as mi
+    known : files that the scene may include, by `files_of`.
 
-    from .additions import FITTED, fit_meshes, put_box_filters, remove_dark_lights
-    from .bands import put_bands
+    Raises a DiffractionError if Mitsuba reads other files than these.
+    """
+    from .additions import fit_meshes, put_box_filters, remove_dark_lights
     from .clamping import put_clamp
     from .mesh_materials import split_meshes
     from .nodes import check_nodes
@@ -240,12 +224,17 @@ def _instantiated(
     config.parallel = False
     with tempfile.TemporaryDirectory() as folder:
         state = mi.parser.parse_file(config, str(file), **values.parameters)
-        check_includes([Path(str(path)) for path in state.files], known)
+        expected = {path.resolve() for path in known}
+        for path in map(Path, map(str, state.files)):
+            if path.resolve() not in expected:  # Mitsuba reads the XML differently than Python
+                raise DiffractionError(
+                    f"'{path}' is included by malformed XML; write <include filename='NAME'/>, "
+                    "without entities of a document type"
+                )
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)
-        _note_files(state)
-        of_meshes = split_meshes(state, values.materials, FITTED)
+        of_meshes = split_meshes(state, values.materials)
         fit_meshes(state, Path(folder))
         edits = put_materials(state, values.materials, of_meshes)
         edits += put_surface_parameters(state, values.surface)
@@ -262,16 +251,16 @@ def _instantiated(
 
 
 @contextlib.contextmanager
-def _files_beside(scene: Path) -> Iterator[None]:
-    """Resolve files that a scene names relative to it."""
-    import mitsuba as mi
-
+def _read_by_mitsuba(scene: Path) -> Iterator[None]:
+    """Resolve files that a scene names relative to it, and raise Mitsuba's errors as `error_of`."""
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
     resolver.prepend(str(scene.absolute().parent))
     mi.set_file_resolver(resolver)
     try:
         yield
+    except (RuntimeError, UnicodeDecodeError) as error:
+        raise error_of("cannot load the scene", error) from error
     finally:
         mi.set_file_resolver(before)
 
@@ -294,8 +283,6 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
 
 def shrink(sensor: Any, factor: float = 2.0) -> None:
     """Divide the width and height of a sensor's film, its crop included, by a factor."""
-    import mitsuba as mi
-
     values = mi.traverse(sensor)
     for name in ("film.size", "film.crop_size", "film.crop_offset"):
         least = 0 if name.endswith("offset") else 1
@@ -326,28 +313,11 @@ def sensor_of(scene: Any, index: int, preview: bool = False) -> Any:
     return sensors[index]
 
 
-def _note_files(state: Any) -> None:
-    """Note the files that a parsed scene names as inputs, where Mitsuba finds them.
-
-    state : `mi.parser.ParserState`.
-    """
-    import mitsuba as mi
-
-    for node in state.nodes:
-        props = node.props
-        for name in list(props.keys()):
-            if props.type(name) == mi.Properties.Type.String and len(text := props[name]) < 1024:
-                note_input(str(mi.file_resolver().resolve(text)))
-                props.mark_queried(name, False)  # Mitsuba refuses what no plugin reads
-
-
 def _check_films(state: Any) -> None:
     """Refuse films whose pictures would exceed the memory of this machine.
 
     state : `mi.parser.ParserState`; no surface is loaded yet, since that may take minutes.
     """
-    import mitsuba as mi
-
     for node in state.nodes:
         if node.type != mi.ObjectType.Film:
             continue
@@ -372,10 +342,10 @@ def _check_films(state: Any) -> None:
 
 
 def plain_text(error: BaseException) -> str:
-    """Return the text of Mitsuba's exception as one line: where in the scene, and the mistake. The
+    """Return the text of Mitsuba's exception as one line: where in the scene, and the mistake.
 
-    places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
-    "while loading" are left out.
+    The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated "while
+    loading" are left out.
     """
     text = _TRACEBACK.sub("", _SOURCE_LINE.sub("", _words(error)))
     places = [(m["file"], m["line"]) for m in _LOADING.finditer(text)]
@@ -391,7 +361,7 @@ def plain_text(error: BaseException) -> str:
     text = re.sub(r"\n\s*- ", " ", text)  # lists
     text = _UNUSED.sub(_unused, text)
     text = _INSTANTIATE.sub(lambda m: f"{m['kind']} {m['type']!r}: ", text)
-    text = one_line(_PLUGIN.sub("", text)).rstrip(" .!")
+    text = one_line(_PLUGIN.sub("", with_relative_indices(text))).rstrip(" .!")
     if places:
         file, line = places[-1]
         text = f"'{file}', {line}: {text}"

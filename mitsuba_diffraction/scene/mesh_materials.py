@@ -14,6 +14,8 @@ from ..gltf import GltfMaterial, materials_of
 from ..plugin.pigment import base_colour
 from .surfaces import appended, copied, inner
 
+#: Shape that is put on the stage; these are split.
+FITTED = "fitted_mesh"
 #: Values of `others`: materials that no surface is put on have the shape's surface, or their own.
 OTHERS = ("surface", "own")
 #: Properties of a shape: numbers of the materials of its file that it has, a text with commas; and
@@ -21,21 +23,20 @@ OTHERS = ("surface", "own")
 PART, OWN = "materials", "own"
 
 
-def split_meshes(state: Any, wanted: Collection[str], fitted: str) -> list[str]:
+def split_meshes(state: Any, wanted: Collection[str]) -> list[str]:
     """Make shapes of the materials of glTF files that surfaces are put on.
 
     Ids of the scene go before names of materials.
 
     state : `mi.parser.ParserState`.
     wanted : ids that surfaces are put on.
-    fitted : type of the shapes that are split.
 
     Returns the names of all materials of these files.
     """
     known: list[str] = []
     for number in range(len(state.nodes)):
         props = state.nodes[number].props
-        if props.plugin_name() != fitted or "filename" not in props:
+        if props.plugin_name() != FITTED or "filename" not in props:
             continue
         others = str(props.get("others", OTHERS[0]))
         check_choice("others", others, OTHERS)

@@ -38,9 +38,11 @@ def check_nodes(state: Any) -> None:
         refuse_pipe(file)
         if not file.is_file():
             continue  # Mitsuba says so
-        if props.plugin_name() in _MESHES:
-            check_mesh(readable_file(file), props.plugin_name(), _number(props))
-        elif props.plugin_name() in _PICTURES:
+        kind = props.plugin_name()
+        if kind in _MESHES:
+            number = props.get("shape_index", 0) if kind == "serialized" else 0
+            check_mesh(readable_file(file), kind, number if isinstance(number, int) else 0)
+        elif kind in _PICTURES:
             _check_pixels(readable_file(file))
     _check_nesting(state)
 
@@ -59,14 +61,6 @@ def _check_pixels(file: Path) -> None:
         return
     with contextlib.suppress(OSError, SyntaxError):
         open_image(file).close()
-
-
-def _number(props: Any) -> int:
-    """Return the number of a mesh in a serialized file."""
-    if props.plugin_name() != "serialized":
-        return 0
-    number = props.get("shape_index", 0)
-    return number if isinstance(number, int) else 0
 
 
 def _check_nesting(state: Any) -> None:

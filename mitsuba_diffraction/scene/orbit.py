@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +24,6 @@ def turn_cameras(sensors: Iterable[Any], shapes: Iterable[Any], degrees: float) 
 
     Raises a DiffractionError if a sensor has no place.
     """
-    import mitsuba as mi
-
     boxes = [shape.bbox() for shape in shapes]
     if not boxes:
         raise DiffractionError(f"{ORBIT}: the scene has no shape that the camera could circle")

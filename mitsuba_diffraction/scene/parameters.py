@@ -7,10 +7,9 @@ import difflib
 import os
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of, refuse_pipe
@@ -65,20 +64,15 @@ def parameters_of(
 
     Raises a DiffractionError if an include is a pipe, or outside of the scene's folder.
     """
-    defaults: dict[str, str | None] = {}
+    document = _Document.of_scene(scene, values)
     try:
-        for element, _ in _elements(_Document.of_scene(scene, values), values or {}, defaults):
-            if element.tag == "default":
-                name = element.get("name", "")
-                if defaults.get(name) is None:  # the first default counts, as in Mitsuba
-                    defaults[name] = element.get("value", "")
-                continue
-            for value in element.attrib.values():
+        for element, _ in document.elements():
+            for value in element.attrib.values() if element.tag != "default" else ():
                 for name in _REFERENCE.findall(value):
-                    defaults.setdefault(name, None)
+                    document.defaults.setdefault(name, None)
     except _Unreadable:
         return None
-    return defaults
+    return document.defaults
 
 
 def files_of(
@@ -96,14 +90,17 @@ def files_of(
     files: dict[Path, None] = {}
     waiting = [scene]
     if scene.suffix.lower() == ".xml":  # else heights or a recipe
-        defaults = parameters_of(scene, values) or {}
-        known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
+        document = _Document.of_scene(scene, values)
         with contextlib.suppress(_Unreadable):
-            for element, folders in _elements(_Document.of_scene(scene, values), known, {}):
-                if name := _file_named(element, known):
-                    # Mitsuba looks for included files and spectra beside the file that names them
-                    beside = element.tag in ("include", "spectrum")
-                    waiting.append(_found(name, folders if beside else folders[1:]))
+            for element, folders in document.elements():
+                text = ""
+                # Mitsuba looks for included files and spectra beside the file that names them
+                if element.tag in ("include", "spectrum"):
+                    text = element.get("filename", "")
+                elif element.tag == "string" and element.get("name") in _FILES:
+                    text, folders = element.get("value", ""), folders[1:]
+                if text:
+                    waiting.append(_found(document.filled(text), folders))
     while waiting:
         file = waiting.pop()
         refuse_pipe(file)
@@ -127,42 +124,8 @@ def note_files(file: Path, values: Mapping[str, str] | None = None) -> None:
             note_input(named)
 
 
-def check_includes(files: Iterable[Path], known: Iterable[Path]) -> None:
-    """Refuse a scene of which Mitsuba has read other files than `files_of` lists.
-
-    files : scene and includes, as Mitsuba has read them.
-    known : by `files_of`.
-
-    Raises a DiffractionError on XML that Mitsuba reads differently than Python.
-    """
-    expected = {file.resolve() for file in known}
-    for file in files:
-        if file.resolve() not in expected:
-            raise DiffractionError(
-                f"'{file}' is included by malformed XML; write <include "
-                "filename='NAME'/>, without entities of a document type"
-            )
-
-
 class _Unreadable(Exception):
     """An included file is missing, and Mitsuba says so."""
-
-
-class _Shallow(ElementTree.TreeBuilder):
-    """Builder of a tree that refuses elements too far within each other."""
-
-    def __init__(self, shown: str) -> None:
-        super().__init__()
-        self._shown, self._depth = shown, 0
-
-    def start(self, tag: Any, attrs: Any) -> ElementTree.Element:
-        self._depth += 1
-        check_count(self._depth, DEEPEST_ELEMENT, self._shown, "elements within each other")
-        return super().start(tag, attrs)
-
-    def end(self, tag: Any) -> ElementTree.Element:
-        self._depth -= 1
-        return super().end(tag)
 
 
 @dataclass(frozen=True)
@@ -174,7 +137,8 @@ class _Document:
     file : the file.
     folders : where Mitsuba looks for a name, after the file's own folder.
     roots : folders within which includes have to lie.
-    chosen : names of parameters that the user has set: files that they name may lie anywhere.
+    values : of parameters that the user has set: files that they name may lie anywhere.
+    defaults : of all parameters so far; None without one.
     depth : of includes within each other.
     includes : number of includes of the scene so far, for each of which Mitsuba reads a file.
     """
@@ -182,7 +146,8 @@ class _Document:
     file: Path
     folders: tuple[Path, ...]
     roots: tuple[Path, ...]
-    chosen: Collection[str]
+    values: Mapping[str, str]
+    defaults: dict[str, str | None] = field(default_factory=dict)
     depth: int = 0
     includes: list[int] = field(default_factory=lambda: [0])
 
@@ -190,7 +155,7 @@ class _Document:
     def of_scene(cls, scene: Path, values: Mapping[str, str] | None) -> _Document:
         # the package's own scenes may be included from everywhere
         roots = (scene.parent, STUDIO.parent)
-        return cls(scene, (scene.parent, Path.cwd()), roots, frozenset(values or ()))
+        return cls(scene, (scene.parent, Path.cwd()), roots, values or {})
 
     def root(self) -> ElementTree.Element:
         """Return the outermost element.
@@ -200,9 +165,17 @@ class _Document:
         refuse_pipe(self.file)
         if self.depth > DEEPEST_INCLUDE or not os.path.isfile(self.file):
             raise _Unreadable
+        depth = 0
         try:
-            parser = ElementTree.XMLParser(target=_Shallow(f"'{self.file}'"))
-            return ElementTree.parse(self.file, parser).getroot()
+            with open(self.file, "rb") as stream:
+                for event, element in ElementTree.iterparse(stream, ("start", "end")):
+                    depth += 1 if event == "start" else -1
+                    check_count(
+                        depth, DEEPEST_ELEMENT, f"'{self.file}'", "elements within each other"
+                    )
+                    if depth == 0:
+                        root = element
+            return root
         except ElementTree.ParseError as error:
             raise DiffractionError(
                 f"'{self.file}' is malformed XML ({error}); mend it, since Mitsuba may read it "
@@ -213,15 +186,40 @@ class _Document:
         except (OSError, ValueError) as error:
             raise _Unreadable from error
 
-    def inner(self, text: str, name: str, folders: tuple[Path, ...]) -> _Document:
-        """Return an include, or the folder of a <path>.
+    def elements(self) -> Iterator[tuple[ElementTree.Element, tuple[Path, ...]]]:
+        """Yield the elements of the file and of its includes, in Mitsuba's order.
 
-        text, name : its name as it is written, and with the values of parameters.
+        With each come the folders in which Mitsuba 3.9 looks for a name; the first is the folder of
+        the element's file.
+        """
+        folders = self.folders
+        for element in self.root().iter():
+            around, name = (self.file.parent, *folders), element.get("name", "")
+            if element.tag == "default" and self.defaults.get(name) is None:
+                self.defaults[name] = element.get("value", "")  # the first counts, as in Mitsuba
+            yield element, around
+            if element.tag == "path":
+                folders = (self.inner(element.get("value", ""), around).file, *folders)
+            elif element.tag == "include":
+                inner = self.inner(element.get("filename", ""), around)
+                self.includes[0] += 1
+                check_count(self.includes[0], MOST_INCLUDES, f"'{self.file}'", "includes so far")
+                yield from inner.elements()
+
+    def filled(self, text: str) -> str:
+        """Return a text with parameters replaced by their values, as far as they have one."""
+        return _REFERENCE.sub(
+            lambda match: self.values.get(match[1]) or self.defaults.get(match[1]) or match[0], text
+        )
+
+    def inner(self, text: str, folders: tuple[Path, ...]) -> _Document:
+        """Return an include, or the folder of a <path>, of this name.
 
         Raises a DiffractionError if it lies outside of all roots.
         """
-        path, roots = _found(name, folders), self.roots
-        if text.startswith("$") and text[1:] in self.chosen:
+        name, roots = self.filled(text), self.roots
+        path = _found(name, folders)
+        if text.startswith("$") and text[1:] in self.values:
             roots = (*roots, path.parent)
         elif not any(path.resolve().is_relative_to(folder.resolve()) for folder in roots):
             raise DiffractionError(
@@ -231,56 +229,10 @@ class _Document:
         return replace(self, file=path, folders=folders, roots=roots, depth=self.depth + 1)
 
 
-def _elements(
-    document: _Document, values: Mapping[str, str], defaults: Mapping[str, str | None]
-) -> Iterator[tuple[ElementTree.Element, tuple[Path, ...]]]:
-    """Yield the elements of a scene and of its includes, in Mitsuba's order.
-
-    With each come the folders in which Mitsuba 3.9 looks for a name; the first is the folder of
-    the element's file.
-
-    values, defaults : of parameters that occur in names; the caller may add to `defaults`.
-    """
-    folders = document.folders
-    for element in document.root().iter():
-        around = (document.file.parent, *folders)
-        yield element, around
-        if element.tag in ("include", "path"):
-            text = element.get("filename" if element.tag == "include" else "value", "")
-            inner = document.inner(text, _with_values(text, values, defaults), around)
-            if element.tag == "path":
-                folders = (inner.file, *folders)
-            else:
-                inner.includes[0] += 1
-                check_count(
-                    inner.includes[0], MOST_INCLUDES, f"'{document.file}'", "includes so far"
-                )
-                yield from _elements(inner, values, defaults)
-
-
-def _file_named(element: ElementTree.Element, values: Mapping[str, str]) -> str:
-    """Return the name of a file that an element makes Mitsuba or a plugin read, or nothing."""
-    text = ""
-    if element.tag == "string" and element.get("name") in _FILES:
-        text = element.get("value", "")
-    elif element.tag in ("include", "spectrum"):
-        text = element.get("filename", "")
-    return _with_values(text, values, {})
-
-
 def _found(name: str, folders: Sequence[Path]) -> Path:
     """Return the first path of this name that exists, or that in the first folder."""
     paths = [folder / name for folder in folders]
     return next((path for path in paths if os.path.lexists(path)), paths[0])
-
-
-def _with_values(text: str, values: Mapping[str, str], defaults: Mapping[str, str | None]) -> str:
-    """The text with parameters replaced by their values, as far as they have one."""
-
-    def value(match: re.Match[str]) -> str:
-        return values.get(match[1]) or defaults.get(match[1]) or match[0]
-
-    return _REFERENCE.sub(value, text)
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,12 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Self
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..plugin.memory import tensor
 from ..progress import Progress
 from .load import error_of
 
@@ -160,17 +162,12 @@ def render_pass(scene: Any, sensor: Any, each: Pass) -> NDArray[np.floating[Any]
 
 def developed(scene: Any, sensor: Any, total: NDArray[np.floating[Any]], spp: int) -> Any:
     """Return the picture, a `mi.Bitmap`, of a sum of passes with `spp` samples per pixel in all."""
-    import mitsuba as mi
-
-    from ..plugin.memory import tensor
-
     integrator, film = integrator_of(scene), sensor.film()
     if _splats(integrator):
         total = total / spp
     film.prepare(integrator.aov_names())
-    storage = tensor(total)
     offset: Any = mi.ScalarPoint2i(film.crop_offset())
-    film.put_block(mi.ImageBlock(storage, offset))
+    film.put_block(mi.ImageBlock(tensor(total), offset))
     return film.bitmap()
 
 
@@ -187,8 +184,6 @@ def integrator_of(scene: Any) -> Any:
 
 def _splats(integrator: Any) -> bool:
     """Whether the integrator splats estimates without weights, so that an average needs them."""
-    import mitsuba as mi
-
     return isinstance(integrator, mi.AdjointIntegrator)
 
 

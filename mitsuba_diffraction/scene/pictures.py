@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 from ..atomic import atomic_path
@@ -22,8 +23,6 @@ def read_exr(path: Path) -> Any:
 
     Raises a DiffractionError if the file is not an EXR, or lacks colours that a screen can show.
     """
-    import mitsuba as mi
-
     readable_file(path)
     if path.suffix.lower() != ".exr":
         raise DiffractionError(f"'{path}' is not an EXR; name a picture that 'render' wrote")
@@ -46,8 +45,6 @@ def check_panorama(path: Path) -> Path:
     Raises a DiffractionError if the file is no picture of latitude and longitude, twice as wide as
     high, or not linear.
     """
-    import mitsuba as mi
-
     readable_file(path)
     try:
         picture = mi.Bitmap(str(path))
@@ -104,8 +101,6 @@ def write_png(
     view : one of `optics.display.VIEWS`.
     metadata : text to store with it, ASCII.
     """
-    import mitsuba as mi
-
     shown_as = getattr(mi.Bitmap.PixelFormat, _SHOWN_AS[colours.pixel_format().name])
     has_alpha, transform = colours.has_alpha(), mi.Bitmap.AlphaTransform
     straight = colours.convert(
@@ -132,8 +127,6 @@ def count_bad(bitmap: Any) -> int:
 
 
 def _write(bitmap: Any, path: Path) -> None:
-    import mitsuba as mi
-
     formats = mi.Bitmap.FileFormat
     stream = mi.MemoryStream()  # Mitsuba's files lose the error of a full disk when they close
     bitmap.write(stream, formats.PNG if path.suffix.lower() == ".png" else formats.OpenEXR)

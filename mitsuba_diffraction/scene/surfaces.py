@@ -232,7 +232,8 @@ def _with_surface(state: Any, number: int | None, text: str, nested: bool) -> An
     """Return the properties of a BSDF with the surface in place of what lies in its wrappers.
 
     number : of the BSDF, or None.
-    nested : whether it is part of another BSDF; otherwise the surface has both sides.
+    nested : whether it is part of another BSDF; otherwise the surface has both sides, unless light
+        goes through it.
     """
     if number is not None:
         props = state.nodes[number].props
@@ -248,7 +249,15 @@ def _with_surface(state: Any, number: int | None, text: str, nested: bool) -> An
             return copy
         number = wrapped if two_sided else number
     surface = _surface(state, text, number)
-    return surface if nested else _two_sided(state, surface)
+    plugin = surface.plugin_name()
+    through = plugin == TRANSMITTING or (
+        plugin == ORDERS and load_orders(surface["filename"]).sides == 2
+    )
+    if nested or through:
+        return surface
+    props = mi.Properties("twosided")
+    props["bsdf"] = appended(state, mi.ObjectType.BSDF, surface)
+    return props
 
 
 def inner(state: Any, node: Any, kind: Any) -> dict[str, int]:
@@ -324,16 +333,6 @@ def _value(text: str) -> float | bool | str:
         return float(text)
     except ValueError:
         return text
-
-
-def _two_sided(state: Any, surface: Any) -> Any:
-    """Return a BSDF with the surface on both sides, or the surface if light goes through it."""
-    name = surface.plugin_name()
-    if name == TRANSMITTING or (name == ORDERS and load_orders(surface["filename"]).sides == 2):
-        return surface
-    props = mi.Properties("twosided")
-    props["bsdf"] = appended(state, mi.ObjectType.BSDF, surface)
-    return props
 
 
 def appended(state: Any, kind: Any, props: Any) -> Any:

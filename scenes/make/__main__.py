@@ -129,8 +129,8 @@ def write_disc(args: argparse.Namespace) -> None:
 def write_knot(args: argparse.Namespace) -> None:
     """Write the knot, without texture coordinates."""
     positions, normals, faces = knot(args.along, args.around)
-    mesh = TriangleMesh(positions, normals, np.zeros((len(positions), 2)), faces)
-    write_ply(args.output, mesh, UNITS, with_uv=False)
+    mesh = TriangleMesh(positions, normals, None, faces)
+    write_ply(args.output, mesh, UNITS)
     _report(args.output, mesh, "no texture coordinates")
 
 

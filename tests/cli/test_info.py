@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction import DiffractionTable, HeightField
+from tests.support.meshes import ply_text
 
 
 @pytest.fixture
@@ -94,35 +95,14 @@ def test_an_exr_that_is_no_table_is_heights(run, tmp_path):
     assert "height field" in run("info", file, "--pixel-size", "1").out
 
 
-MESH = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-{properties}element face 2
-property list uchar int vertex_indices
-end_header
-0 0 0{a}
-1 0 0{b}
-1 1 0{c}
-0 1 0{d}
-3 0 1 2
-3 0 2 3
-"""
-
-
 @pytest.mark.parametrize("own", [True, False], ids=["normals", "none"])
 @pytest.mark.parametrize("has_uv", [True, False])
 def test_a_mesh_is_judged_by_its_tangents_and_normals(run, tmp_path, has_uv, own):
     file = tmp_path / "quad.ply"
-    names = [*(["nx", "ny", "nz"] if own else []), *(["u", "v"] if has_uv else [])]
-    properties = "".join(f"property float {name}\n" for name in names)
-    values = [
-        (" 0 0 1" if own else "") + (uv if has_uv else "")
-        for uv in (" 0 0", " 1 0", " 1 1", " 0 1")
-    ]
-    file.write_text(MESH.format(properties=properties, **dict(zip("abcd", values, strict=True))))
+    names = ["x", "y", "z", *(["nx", "ny", "nz"] * own), *(["u", "v"] * has_uv)]
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    rows = [(*uv, 0, *((0, 0, 1) * own), *(uv * has_uv)) for uv in square]
+    file.write_text(ply_text(rows, [(0, 1, 2), (0, 2, 3)], names))
     data = json.loads(run("info", file, "--json").out)
     assert data["kind"] == "mesh"
     assert data["triangles"] == 2

@@ -22,26 +22,14 @@ from mitsuba_diffraction.tables.document import parse_document, shape_of, with_c
 from tests.fuzz.looked_up import look_up_in_plugin, use_table
 from tests.support.directions import rough_patch
 from tests.support.instruments import nanoscope
+from tests.support.meshes import ply_text
 from tests.support.table_files import document_in
 
 _MOST = 500  # characters of a message
 _MOST_NUMBERS = 10**6  # of a table
 _HEIGHTS = (".png", ".tiff", ".bmp", ".npy", ".txt", ".csv", ".spm")
 _RECIPE = 'generator = "sinusoidal"\ncoherence_width = 4\n[arguments]\nperiod = 1.6\ndepth = 0.06\n'
-_PLY = """ply
-format ascii 1.0
-element vertex 3
-property float x
-property float y
-property float z
-element face 1
-property list uchar int vertex_indices
-end_header
-0 0 0
-1 0 0
-0 1 0
-3 0 1 2
-"""
+_PLY = ply_text([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], "xyz")
 _OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n"
 _GWYDDION = "# Channel: Height\n# Width: 2.4 µm\n# Height: 2 µm\n# Value units: nm\n"
 _SCENE = """<scene version="3.0.0"><default name="width" value="4"/>

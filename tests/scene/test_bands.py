@@ -26,47 +26,60 @@ SCENE = """<scene version="3.0.0">
             <lookat origin="{camera}" target="0, 0, 0" up="0, 0, 1"/>
         </transform>
         <sampler type="independent"/>
-        <film type="hdrfilm">
+        <film type="{film}">{bands}
             <integer name="width" value="4"/>
             <integer name="height" value="4"/>
             <rfilter type="box"/>
         </film>
     </sensor>
-    <shape type="rectangle">
-        <bsdf type="diffraction">
-            <string name="filename" value="{heights}"/>
-            <string name="pixel_size" value="{pixel}"/>
-            <string name="level" value="none"/>
-        </bsdf>
-    </shape>
+    {shapes}
     <emitter type="directional">
         <vector name="direction" value="{towards}"/>
-        <spectrum name="irradiance" value="300:1, 830:1"/>
+        <spectrum name="irradiance" value="200:1, 5000:1"/>
     </emitter>
 </scene>"""
+FIELD = rough_patch((48, 48), (PIXEL, PIXEL), 0.02)
 
 
-def _text(vector):
-    return ", ".join(f"{x:.9f}" for x in vector)
+def surface(more="", *, heights="heights.npy", moved=""):
+    """A rectangle with the rough surface, or that of a table."""
+    texts = {"filename": heights}
+    if heights.endswith(".npy"):
+        texts |= {"pixel_size": PIXEL, "level": "none"}
+    given = "".join(f'<string name="{name}" value="{text}"/>' for name, text in texts.items())
+    bsdf = f'<bsdf type="diffraction">{given}{more}</bsdf>'
+    return f'<shape type="rectangle">{moved}{bsdf}</shape>'
 
 
 @pytest.fixture
 def scene(tmp_path):
-    """A rough surface in light as strong at every wavelength."""
-    field = rough_patch((48, 48), (PIXEL, PIXEL), 0.02)
-    np.save(tmp_path / "heights.npy", field.heights)
-    field = md.HeightField.load(tmp_path / "heights.npy", pixel_size=PIXEL, level="none")
-    camera, towards = 5.0 * polar(*CAMERA), -polar(*LIGHT)
-    text = SCENE.format(
-        camera=_text(camera), towards=_text(towards), heights="heights.npy", pixel=PIXEL
-    )
-    (tmp_path / "scene.xml").write_text(text)
-    return field, tmp_path / "scene.xml"
+    """`scene(*shapes, spans=…)`: the file of a scene in light as strong at every wavelength.
+
+    spans : ends of the film's bands, nm; otherwise it has colours.
+    """
+    np.save(tmp_path / "heights.npy", FIELD.heights)
+
+    def write(*shapes, spans=()):
+        camera, towards = (
+            ", ".join(f"{x:.9f}" for x in way) for way in (5.0 * polar(*CAMERA), -polar(*LIGHT))
+        )
+        bands = "".join(
+            f'<spectrum name="b{n}" value="{a}:1, {b}:1"/>' for n, (a, b) in enumerate(spans)
+        )
+        text = SCENE.format(
+            camera=camera, towards=towards, shapes="".join(shapes), bands=bands,
+            film="specfilm" if spans else "hdrfilm",
+        )  # fmt: skip
+        (tmp_path / "scene.xml").write_text(text)
+        return tmp_path / "scene.xml"
+
+    return write
 
 
-def test_a_band_of_ultraviolet_is_the_reference_s_integral(scene):
+def test_a_band_of_ultraviolet_is_the_reference_s_integral(scene, tmp_path):
     mi.set_variant("llvm_ad_spectral")
-    field, file = scene
+    file = scene(surface())
+    field = md.HeightField.load(tmp_path / "heights.npy", pixel_size=PIXEL, level="none")
     nodes = np.arange(300.0, 701.0)
     spans = {"uv": (310.0, 340.0), "green": (520.0, 560.0)}
     bands = SensorBands(
@@ -91,11 +104,8 @@ def test_a_band_of_ultraviolet_is_the_reference_s_integral(scene):
 
 def test_tables_that_begin_at_longer_wavelengths_are_refused(scene, tmp_path):
     mi.set_variant("llvm_ad_spectral")
-    field, file = scene
-    md.DiffractionTable.build(field).save(tmp_path / "table.exr")
-    text = file.read_text()
-    first, last = text.index('<string name="filename"'), text.index("</bsdf>")
-    file.write_text(f'{text[:first]}<string name="filename" value="table.exr"/>{text[last:]}')
+    md.DiffractionTable.build(FIELD).save(tmp_path / "table.exr")
+    file = scene(surface(heights="table.exr"))
     with pytest.raises(md.DiffractionError, match="begins at 360 nm"):
         load_scene(file, {}, bands=SensorBands([300.0, 350.0, 400.0], {"u": [0.0, 1.0, 0.0]}))
     load_scene(file, {}, bands=SensorBands([400.0, 450.0, 500.0], {"s": [0.0, 1.0, 0.0]}))
@@ -122,28 +132,15 @@ WARNED = {
 }
 
 
-def _banded(file, spans, second=""):
-    """Put a film of bands into the scene, light at all wavelengths, and a second surface."""
-    bands = "".join(
-        f'<spectrum name="b{n}" value="{a}:1, {b}:1"/>' for n, (a, b) in enumerate(spans)
-    )
-    text = file.read_text().replace('type="hdrfilm">', f'type="specfilm">{bands}')
-    text = text.replace("300:1, 830:1", "200:1, 5000:1")
-    file.write_text(text.replace("<emitter", f"{second}<emitter"))
-
-
 @pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_spectral"])
 @pytest.mark.parametrize("case", RANGES)
 def test_bands_that_the_table_lacks_have_a_warning_for_each_surface(scene, variant, case):
     spans = RANGES[case]
     mi.set_variant(variant)
-    _, file = scene
-    text = file.read_text()
-    shape = text[text.index("<shape") : text.index("</shape>")]
     # equal surfaces would be merged
-    turned = '<float name="orientation" value="30"/></bsdf>'
-    far = '<transform name="to_world"><translate z="-9"/></transform></shape>'
-    _banded(file, spans, shape.replace("</bsdf>", turned) + far)
+    turned = '<float name="orientation" value="30"/>'
+    far = '<transform name="to_world"><translate z="-9"/></transform>'
+    file = scene(surface(), surface(turned, moved=far), spans=spans)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", md.DiffractionWarning)
         loaded = load_scene(file, {})
@@ -163,13 +160,9 @@ def test_bands_that_the_table_lacks_have_a_warning_for_each_surface(scene, varia
 
 def test_solved_orders_are_named_with_their_own_range(scene, tmp_path):
     mi.set_variant("llvm_ad_spectral")
-    _, file = scene
     thin_grating(0.6, counts=(2, 2, 1)).save(tmp_path / "orders.nc")
-    text = file.read_text()
-    first, last = text.index("<bsdf"), text.index("</bsdf>")
-    orders = '<bsdf type="diffraction_orders"><string name="filename" value="orders.nc"/>'
-    file.write_text(text[:first] + orders + text[last:])
-    _banded(file, [(200.0, 600.0)])
+    shape = surface(heights="orders.nc").replace('"diffraction"', '"diffraction_orders"')
+    file = scene(shape, spans=[(200.0, 600.0)])
     line = r"black outside [\d.]+ to [\d.]+ nm, .* make the table with a wider range of wave"
     with pytest.warns(md.DiffractionWarning, match=line):
         load_scene(file, {})
@@ -178,9 +171,7 @@ def test_solved_orders_are_named_with_their_own_range(scene, tmp_path):
 @pytest.mark.parametrize("wavelength", [200.0, 1500.0])
 def test_mono_variants_refuse_wavelengths_outside_the_table(scene, wavelength):
     mi.set_variant("llvm_ad_mono")
-    _, file = scene
-    lit = f'<float name="wavelength" value="{wavelength}"/></bsdf>'
-    file.write_text(file.read_text().replace("</bsdf>", lit))
+    file = scene(surface(f'<float name="wavelength" value="{wavelength}"/>'))
     with pytest.raises(md.DiffractionError, match="outside the table's 360 to 830 nm"):
         load_scene(file, {})
 

@@ -17,6 +17,7 @@ from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.logo import areas, wavelengths_of
 from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from tests.support.logos import drawn, write_board
+from tests.support.meshes import obj_of
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
@@ -125,11 +126,9 @@ def test_on_a_mesh_it_is_as_a_diffuse_texture_on_an_obj(
 def write_can(file: Path, seam: float) -> None:
     """Write a cylinder, z up; its texture coordinates begin at this azimuth, degrees from −y."""
     around = np.radians(seam - 90.0) + np.linspace(0, 2 * np.pi, 49)
-    lines = [f"v {3 * np.cos(a)} {3 * np.sin(a)} {z}" for z in (0, 6) for a in around]
-    lines += [f"vt {u} {v}" for v in (0, 1) for u in np.linspace(0, 1, 49)]
-    corners = ((k, k + 1, k + 50, k + 49) for k in range(1, 49))
-    lines += ["f " + " ".join(f"{k}/{k}" for k in quad) for quad in corners]
-    file.write_text("\n".join(lines) + "\n")
+    places = [(3 * np.cos(a), 3 * np.sin(a), z) for z in (0, 6) for a in around]
+    uv = [(u, v) for v in (0, 1) for u in np.linspace(0, 1, 49)]
+    obj_of(file, places, [(k, k + 1, k + 50, k + 49) for k in range(48)], uv)
 
 
 @pytest.mark.parametrize("seam", [0.0, 20.0, -20.0])

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import warnings
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.scene.load import load_scene, plain_text
+from tests.support.room import SKIN, scene_file, skin
 
-BSDF = (
-    '<bsdf type="diffraction"><string name="filename" value="grating.npy"/>'
-    '<float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>'
-    '<boolean name="energy_conserving" value="false"/></bsdf>'
-)
-TWOSIDED = f'<bsdf type="twosided">{BSDF}</bsdf>'
-FOLLOWING = BSDF.replace(
-    "</bsdf>",
+TWOSIDED = f'<bsdf type="twosided">{SKIN}</bsdf>'
+FOLLOWING = skin(
     '<texture type="mesh_attribute" name="orientation"><string name="name" '
-    'value="vertex_orientation"/></texture></bsdf>',
+    'value="vertex_orientation"/></texture>'
 )
-TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+TRIANGLE = f"{CORNERS}f 1 2 3\n"
+UNWRAPPED = f"{CORNERS}vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 
 # as Mitsuba 3.9.1 throws them
 CASES = {
@@ -52,6 +48,11 @@ CASES = {
         "'a.xml', line 2: shape 'ply': '/m/ball.obj' is not a PLY mesh, which the scene expects: "
         "run the command 'tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
     ),
+    '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "obj": '
+    '[OBJMesh] Error while loading OBJ file "a.obj": reference to invalid vertex 4294967293!': (
+        "'a.xml', line 2: shape 'obj': Error while loading OBJ file \"a.obj\": it names vertex -3, "
+        "counted back from the last, which Mitsuba does not read"
+    ),
     # quads, in binary and as text
     '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
     '[PLYMesh] Error while loading PLY file "q.ply": incompatible contents -- is this a triangle '
@@ -68,43 +69,29 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def scene_of(tmp_path, monkeypatch):
-    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path / "cache"))
-    monkeypatch.chdir(tmp_path)
-    np.save("grating.npy", np.tile(0.01 * np.sin(np.pi * np.arange(60) / 30), (60, 1)))
-
-    def write(mesh: str, bsdf: str):
-        (tmp_path / "mesh.obj").write_text(mesh)
-        file = tmp_path / "scene.xml"
-        file.write_text(
-            '<scene version="3.0.0"><shape type="obj" id="hide">'
-            f'<string name="filename" value="mesh.obj"/>{bsdf}</shape></scene>'
-        )
-        return file
-
-    return write
+def obj_scene(folder, mesh, bsdf):
+    """Write a scene of a mesh, and the mesh beside it."""
+    (folder / "mesh.obj").write_text(mesh)
+    name = '<string name="filename" value="mesh.obj"/>'
+    return scene_file(folder, f'<shape type="obj" id="hide">{name}{bsdf}</shape>')
 
 
 @pytest.mark.usefixtures("variant")
-@pytest.mark.parametrize("bsdf", [BSDF, TWOSIDED])
-def test_a_mesh_without_texture_coordinates_is_named(scene_of, bsdf):
+@pytest.mark.parametrize("bsdf", [SKIN, TWOSIDED])
+def test_a_mesh_without_texture_coordinates_is_named(tmp_path, bsdf):
     with pytest.warns(DiffractionWarning, match="no texture coordinates on hide"):
-        load_scene(scene_of(TRIANGLE + "f 1 2 3\n", bsdf), {})
+        load_scene(obj_scene(tmp_path, TRIANGLE, bsdf), {})
 
 
 @pytest.mark.usefixtures("variant")
-def test_shapes_without_id_are_named_by_file_or_place(scene_of):
-    file = scene_of(TRIANGLE + "f 1 2 3\n", BSDF)
+def test_shapes_without_id_are_named_by_file_or_place(tmp_path):
+    file = obj_scene(tmp_path, TRIANGLE, SKIN)
     file.write_text(file.read_text().replace(' id="hide"', ""))
     with pytest.warns(
         DiffractionWarning, match=r"coordinates on shape 1 \(the mesh mesh\.obj\): the"
     ):
         load_scene(file, {})
-    file.write_text(
-        f'<scene version="3.0.0"><shape type="sphere"/><shape type="sphere">{FOLLOWING}</shape>'
-        "</scene>"
-    )
+    scene_file(tmp_path, f'<shape type="sphere"/><shape type="sphere">{FOLLOWING}</shape>')
     with pytest.raises(
         DiffractionError, match=r"^shape 2 \(a sphere without id\) has no .* or use a mesh$"
     ):
@@ -115,22 +102,22 @@ def test_shapes_without_id_are_named_by_file_or_place(scene_of):
 @pytest.mark.parametrize(
     ("mesh", "bsdf"),
     [
-        (TRIANGLE + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n", BSDF),
-        (TRIANGLE + "f 1 2 3\n", '<bsdf type="diffuse"/>'),
+        (UNWRAPPED, SKIN),
+        (TRIANGLE, '<bsdf type="diffuse"/>'),
     ],
 )
-def test_no_other_mesh_is(scene_of, mesh, bsdf):
+def test_no_other_mesh_is(tmp_path, mesh, bsdf):
     with warnings.catch_warnings():
         warnings.simplefilter("error", DiffractionWarning)
-        load_scene(scene_of(mesh, bsdf), {})
+        load_scene(obj_scene(tmp_path, mesh, bsdf), {})
 
 
 @pytest.mark.usefixtures("variant")
 @pytest.mark.parametrize("bsdf", [FOLLOWING, f'<bsdf type="twosided">{FOLLOWING}</bsdf>'])
-def test_a_mesh_without_the_field_that_turns_the_patch_is_refused(scene_of, bsdf):
+def test_a_mesh_without_the_field_that_turns_the_patch_is_refused(tmp_path, bsdf):
     """Kernels would go on with zeros, and not turn it."""
     with pytest.raises(DiffractionError, match=r"hide has no attribute vertex_.*'tangents MESH"):
-        load_scene(scene_of(TRIANGLE + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n", bsdf), {})
+        load_scene(obj_scene(tmp_path, UNWRAPPED, bsdf), {})
 
 
 @pytest.mark.parametrize("text", CASES)

@@ -157,18 +157,10 @@ def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
-    monkeypatch.setattr(
-        "mitsuba_diffraction.cli.Bar.__call__",
-        lambda *_: signal.raise_signal(signal.SIGINT),
-    )
-    assert run("render", scene, *QUICK, "-o", "a.exr").code == 130
-    assert os.listdir() == ["room.xml"]
-
-
-def test_ctrl_c_while_compiling_writes_nothing(run, scene, monkeypatch):
+@pytest.mark.parametrize("doing", ["loading", "compiling"])
+def test_ctrl_c_before_the_first_samples_writes_nothing(run, scene, monkeypatch, doing):
     def interrupt(self, done, total, text):
-        if text == "compiling":
+        if text == doing:
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("mitsuba_diffraction.cli.Bar.__call__", interrupt)

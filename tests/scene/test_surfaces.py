@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import mitsuba as mi
-import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.load import load_scene
 from tests.support.orders import thin_grating
+from tests.support.room import scene_file, skin
 
-EXPORTED = """<scene version="2.1.0">
+EXPORTED = """
 	<bsdf type="twosided" id="mat-Skin" name="mat-Skin">
 		<bsdf type="principled" name="bsdf"><rgb name="base_color" value="0.3 0.1 0.1"/></bsdf>
 	</bsdf>
@@ -21,22 +21,21 @@ EXPORTED = """<scene version="2.1.0">
 	</bsdf>
 	<shape type="sphere" id="elm__0" name="elm__0"><ref id="mat-Skin" name="bsdf"/></shape>
 	<shape type="rectangle" id="elm__4" name="elm__4"><ref id="mat-Ground" name="bsdf"/></shape>
-</scene>"""
-SETTINGS = ",pixel_size=0.08,coherence_width=4,energy_conserving=false"
+"""
+SETTINGS = ",coherence_width=4,energy_conserving=false"
+DISK = '<shape type="disk"><ref id="skin"/></shape>'
 
 
 @pytest.fixture
 def surface(tmp_path: Path) -> Path:
     mi.set_variant("llvm_ad_spectral")
-    (tmp_path / "scene.xml").write_text(EXPORTED)
-    heights = 0.05 * np.sin(2 * np.pi * np.arange(64) / 16)
-    np.save(tmp_path / "grating.npy", np.tile(heights, (64, 1)))
+    scene_file(tmp_path, EXPORTED)
     return tmp_path
 
 
 def bsdfs(folder: Path, materials: dict[str, str]) -> dict[str, str]:
     """Text of each shape's BSDF, by id."""
-    values = {f"material:{k}": f"{folder / 'grating.npy'}{v}" for k, v in materials.items()}
+    values = {f"material:{k}": f"{folder / 'grating.toml'}{v}" for k, v in materials.items()}
     scene = load_scene(folder / "scene.xml", values)
     return {shape.id(): str(shape.bsdf()) for shape in scene.shapes()}
 
@@ -63,14 +62,8 @@ def test_unknown_ids_are_answered_with_those_of_the_scene(surface):
 
 def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
     thin_grating(0.6, counts=(2, 2, 1)).save(surface / "orders.nc")
-    old = f"""<bsdf type="diffraction" id="tracks">
-        <string name="filename" value="{surface / "grating.npy"}"/>
-        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
-        <boolean name="energy_conserving" value="false"/><float name="orientation" value="30"/>
-    </bsdf>"""
-    scene = f'<scene version="3.0.0">{old}<shape type="disk"><ref id="tracks"/></shape></scene>'
-    (surface / "scene.xml").write_text(scene)
-    loaded = load_scene(surface / "scene.xml", {"material:tracks": str(surface / "orders.nc")})
+    scene = scene_file(surface, skin('<float name="orientation" value="30"/>'), DISK)
+    loaded = load_scene(scene, {"material:skin": str(surface / "orders.nc")})
     text = str(loaded.shapes()[0].bsdf())
     assert "DiffractionOrders[" in text
     assert "orientation = 30" in text
@@ -80,14 +73,10 @@ def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
 @pytest.mark.parametrize("thin", [True, False], ids=["table", "heights"])
 def test_light_goes_through_a_sheet_that_replaces_a_material(surface, thin):
     thin_grating(0.6, counts=(2, 2, 1), thin=True).save(surface / "sheet.nc")
-    scene = (
-        '<scene version="3.0.0"><bsdf type="diffuse" id="pane"/>'
-        '<shape type="disk"><ref id="pane"/></shape></scene>'
-    )
-    (surface / "scene.xml").write_text(scene)
-    settings = "pixel_size=0.08,coherence_width=4,energy_conserving=false,thin=true,int_ior=1.5"
-    text = surface / "sheet.nc" if thin else f"{surface / 'grating.npy'},{settings}"
-    loaded = load_scene(surface / "scene.xml", {"material:pane": str(text)})
+    scene = scene_file(surface, '<bsdf type="diffuse" id="skin"/>', DISK)
+    heights = f"{surface / 'grating.toml'}{SETTINGS},thin=true,int_ior=1.5"
+    text = str(surface / "sheet.nc") if thin else heights
+    loaded = load_scene(scene, {"material:skin": text})
     flags = loaded.shapes()[0].bsdf().flags()
     assert mi.has_flag(flags, mi.BSDFFlags.Transmission)
     assert not mi.has_flag(flags, mi.BSDFFlags.Diffuse)
@@ -106,16 +95,10 @@ def test_a_look_is_put_on_an_id(surface):
 @pytest.mark.parametrize("old", ["material=Al", "pigment=0.25"])
 def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surface, old):
     name, value = old.split("=")
-    xml = f"""<scene version="3.0.0"><bsdf type="diffraction" id="skin">
-        <string name="filename" value="{surface / "grating.npy"}"/>
-        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
-        <boolean name="energy_conserving" value="false"/><string name="{name}" value="{value}"/>
-    </bsdf><shape type="disk"><ref id="skin"/></shape></scene>"""
-    (surface / "scene.xml").write_text(xml)
+    scene_file(surface, skin(f'<string name="{name}" value="{value}"/>'), DISK)
     text = bsdfs(surface, {"skin": SETTINGS + ",int_ior=1.6"}).popitem()[1]
-    assert text.count("Diffraction[") == text.count(
-        "brdf["
-    )  # a metal beneath would look like chrome
+    # a metal beneath would look like chrome
+    assert text.count("Diffraction[") == text.count("brdf[")
     assert ("SmoothDiffuse" in text) == (name == "pigment")
     assert "material = Al" not in text
 
@@ -128,21 +111,15 @@ def test_an_unknown_id_is_named_as_it_was_typed(surface):
 
 
 def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):
-    spare = EXPORTED.replace("<shape", '<bsdf type="diffuse" id="spare"/><shape', 1)
-    (surface / "scene.xml").write_text(spare)
+    scene_file(surface, '<bsdf type="diffuse" id="spare"/>', EXPORTED)
     with pytest.raises(DiffractionError, match=r"no shape uses .*'spare'; .*mat-Skin, mat-Ground"):
         bsdfs(surface, {"spare": SETTINGS})
 
 
 @pytest.mark.parametrize("part", ['<bsdf type="plastic"', '<ref id="below"'])
 def test_what_lies_beneath_a_replaced_surface_is_kept(surface, part):
-    (surface / "scene.xml").write_text(f"""<scene version="3.0.0"><bsdf type="plastic" id="below"/>
-    <bsdf type="diffraction" id="skin">
-        <string name="filename" value="{surface / "grating.npy"}"/>
-        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
-        <boolean name="energy_conserving" value="false"/>{part} name="beneath"/>
-    </bsdf><shape type="sphere" id="ball"><ref id="skin"/></shape></scene>""")
-    text = bsdfs(surface, {"skin": SETTINGS})["ball"]
+    scene_file(surface, '<bsdf type="plastic" id="below"/>', skin(f'{part} name="beneath"/>'), DISK)
+    text = bsdfs(surface, {"skin": SETTINGS}).popitem()[1]
     assert "Plastic" in text
     assert text.count("Diffraction[") == 2  # on both sides
 
@@ -155,8 +132,7 @@ def test_a_surface_that_another_one_hides_is_refused(surface, order):
 
 
 def test_two_ids_of_one_bsdf_get_one_surface(surface):
-    alias = EXPORTED.replace("<shape", '<alias id="mat-Skin" as="hide"/><shape', 1)
-    (surface / "scene.xml").write_text(alias)
+    scene_file(surface, EXPORTED, '<alias id="mat-Skin" as="hide"/>')
     assert "Diffraction[" in bsdfs(surface, {"hide": SETTINGS})["elm__0"]
     with pytest.raises(DiffractionError, match="both ids are of one BSDF"):
         bsdfs(surface, {"hide": SETTINGS, "mat-Skin": SETTINGS})
@@ -164,8 +140,7 @@ def test_two_ids_of_one_bsdf_get_one_surface(surface):
 
 @pytest.mark.parametrize("name", ["mat-Skin", "elm__0"])
 def test_the_opacity_around_a_replaced_bsdf_is_kept(surface, name):
-    masked = EXPORTED.replace('type="twosided" id="mat-Skin"', 'type="mask" id="mat-Skin"', 1)
-    (surface / "scene.xml").write_text(masked)
+    scene_file(surface, EXPORTED.replace('"twosided" id="mat-Skin"', '"mask" id="mat-Skin"'))
     text = bsdfs(surface, {name: SETTINGS})["elm__0"]
     assert text.startswith("Mask[")
     assert "Diffraction[" in text
@@ -175,30 +150,26 @@ def test_the_opacity_around_a_replaced_bsdf_is_kept(surface, name):
 def test_each_edit_is_said_with_its_shapes_and_index(surface):
     lines: list[str] = []
     values = {
-        "material:mat-Skin": f"{surface / 'grating.npy'}{SETTINGS},int_ior=1.6",
+        "material:mat-Skin": f"{surface / 'grating.toml'}{SETTINGS},int_ior=1.6",
         "height_scale": "0.5",
     }
     load_scene(surface / "scene.xml", values, say=lines.append)
-    assert lines[0].startswith("mat-Skin: grating.npy")
+    assert lines[0].startswith("mat-Skin: grating.toml")
     assert lines[1].startswith("height_scale=0.5")
     assert all("on 1 shape (elm__0)" in line and "n = 1.6" in line for line in lines)
 
 
 def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
-    metal = f"{surface / 'grating.npy'}{SETTINGS},material=Al"
-    xml = f"""<scene version="3.0.0"><default name="up" value="0"/><default name="r" value="1"/>
-    <bsdf type="diffraction" id="skin">
-        <string name="filename" value="{surface / "grating.npy"}"/>
-        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
-        <boolean name="energy_conserving" value="false"/><float name="lateral_scale" value="$r"/>
-    </bsdf><shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>
-    <shape type="disk"><ref id="skin"/></shape></scene>"""
-    (surface / "scene.xml").write_text(xml.replace('<default name="up" value="0"/>', ""))
-    load_scene(surface / "scene.xml", {"material:skin": metal, "r": "2"})  # of the sphere
-    (surface / "scene.xml").write_text(xml.replace('scale" value="$r"', 'scale" value="$up"'))
-    load_scene(surface / "scene.xml", {"material:skin": metal, "up": "0.0"})  # the default
+    metal = f"{surface / 'grating.toml'}{SETTINGS},material=Al"
+    radius = '<default name="r" value="1"/>'
+    ball = '<shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>'
+    scene = scene_file(surface, radius, skin('<float name="lateral_scale" value="$r"/>'), ball)
+    load_scene(scene, {"material:skin": metal, "r": "2"})  # of the sphere
+    stretched = skin('<float name="lateral_scale" value="$up"/>')
+    scene_file(surface, radius, '<default name="up" value="0"/>', stretched, ball)
+    load_scene(scene, {"material:skin": metal, "up": "0.0"})  # the default
     with pytest.raises(DiffractionError, match=r"up=2 changes nothing"):
-        load_scene(surface / "scene.xml", {"material:skin": metal, "up": "2"})
+        load_scene(scene, {"material:skin": metal, "up": "2"})
 
 
 def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surface):
@@ -207,14 +178,11 @@ def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surfa
         <emitter type="constant"><float name="radiance" value="$power"/></emitter></scene>"""
     )
     (surface / "dark.xml").write_text('<scene version="3.0.0"/>')
-    (surface / "scene.xml").write_text(
-        """<scene version="3.0.0"><default name="light" value="dark.xml"/>
-        <bsdf type="diffuse" id="skin"/><shape type="sphere"><ref id="skin"/></shape>
-        <include filename="$light"/></scene>"""
-    )
-    metal = f"{surface / 'grating.npy'}{SETTINGS},material=Al"
+    light = '<default name="light" value="dark.xml"/><include filename="$light"/>'
+    scene = scene_file(surface, '<bsdf type="diffuse" id="skin"/>', DISK, light)
+    metal = f"{surface / 'grating.toml'}{SETTINGS},material=Al"
     values = {"material:skin": metal, "light": str(surface / "lit.xml"), "power": "2"}
-    assert len(load_scene(surface / "scene.xml", values).emitters()) == 1
+    assert len(load_scene(scene, values).emitters()) == 1
     # the default in other words
     values = {"material:skin": metal, "light": str(surface / "dark.xml")}
-    assert not load_scene(surface / "scene.xml", values).emitters()
+    assert not load_scene(scene, values).emitters()

@@ -12,30 +12,25 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.additions import CLAMP
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orbit import vertical
+from tests.support.room import scene_file, skin
 
-SCENE = """<scene version="3.0.0">
-    <default name="lamp" value="1"/><default name="sky" value="1"/>
-    <default name="material" value="Al"/>
-    <shape type="sphere"><bsdf type="twosided"><bsdf type="diffraction" id="skin">
-        <string name="filename" value="grating.npy"/>
-        <float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>
-        <boolean name="energy_conserving" value="false"/><string name="material" value="$material"/>
-    </bsdf></bsdf></shape>
+METAL = skin('<string name="material" value="$material"/>')
+DEFAULTS = """<default name="lamp" value="1"/><default name="sky" value="1"/>
+    <default name="material" value="Al"/>"""
+LIGHTS = """
     <shape type="rectangle" id="lamp"><emitter type="area">
         <spectrum name="radiance" type="d65"><float name="scale" value="$lamp"/></spectrum>
     </emitter></shape>
     <emitter type="constant">
         <spectrum name="radiance" type="d65"><float name="scale" value="$sky"/></spectrum>
-    </emitter>
-</scene>"""
+    </emitter>"""
+BALL = '<shape type="sphere"><bsdf type="twosided">{}</bsdf></shape>'
 
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     mi.set_variant("llvm_ad_spectral")
-    np.save(tmp_path / "grating.npy", np.tile(0.05 * np.sin(np.arange(64) * np.pi / 8), (64, 1)))
-    (tmp_path / "scene.xml").write_text(SCENE)
-    return tmp_path / "scene.xml"
+    return scene_file(tmp_path, DEFAULTS, BALL.format(METAL), LIGHTS)
 
 
 def test_parameters_of_the_surface_reach_it(scene):
@@ -50,8 +45,7 @@ def test_the_scenes_own_parameter_goes_first(scene):
 
 
 def test_a_scene_without_the_surface_refuses_its_parameters(scene):
-    scene.write_text(SCENE.replace('"diffraction"', '"diffuse"').split("<string")[0] +
-                     SCENE[SCENE.index("</bsdf>"):])  # fmt: skip
+    scene_file(scene.parent, DEFAULTS, BALL.format('<bsdf type="diffuse"/>'), LIGHTS)
     with pytest.raises(DiffractionError, match="as a material or a preset"):
         load_scene(scene, {"height_scale": "0.5"})
     with pytest.raises(DiffractionError, match="did you mean lamp"):
@@ -66,21 +60,20 @@ def test_a_light_of_radiance_0_is_off(scene, off, left):
     assert len(loaded.shapes()) == 2
 
 
-BALL = """<scene version="3.5.0">
+CAMERA = """
   <sensor type="perspective">
     <transform name="to_world"><lookat origin="4,-9,2" target="4,0,2" up="0,0,1"/></transform>
   </sensor>
   <shape type="sphere"><point name="center" x="4" y="1" z="2"/><bsdf type="diffuse"/></shape>
-</scene>
 """
 
 
 def test_a_camera_goes_around_the_middle_of_the_shapes(tmp_path: Path) -> None:
     mi.set_variant("scalar_rgb")
-    (tmp_path / "ball.xml").write_text(BALL)
+    file = scene_file(tmp_path, CAMERA)
 
     def pose(degrees: float) -> np.ndarray:
-        scene = load_scene(tmp_path / "ball.xml", {"render:orbit": str(degrees)})
+        scene = load_scene(file, {"render:orbit": str(degrees)})
         return np.array(scene.sensors()[0].world_transform().matrix)
 
     # 10 in front of the middle (4, 1, 2), then 10 to its right, still looking at it

@@ -1,4 +1,4 @@
-"""Efficiencies of another program on a wall: orders where they belong, as bright as listed."""
+"""Orders on a wall: where the grating equation says, and as bright as another program lists."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ PERIOD, WAVELENGTH, INCIDENCE, TILT = 1.6, 0.6, 10.0, 5.0  # µm and degrees
 EFFICIENCIES = {-2: 0.05, -1: 0.1, 0: 0.3, 1: 0.25, 2: 0.15, 3: 0.05}
 #: Orders that the wall catches.
 SEEN = (-1, 0, 1, 2)
+WALL, HEIGHT = 22.0, 9.0  # cm: the wall's distance, and how high the light meets it
 
 
 @pytest.fixture
@@ -39,12 +40,12 @@ def turned(angle: float, axis: int) -> np.ndarray:
 
 
 def place_on_wall(order: int) -> np.ndarray:
-    """Point of the wall at y = 22 that an order hits, by the grating equation."""
+    """Point of the wall, at y = 22, that an order hits, by the grating equation."""
     to_world = turned(INCIDENCE, 2) @ turned(TILT, 0) @ turned(-90.0, 0)
     light = to_world.T @ [0.0, 1.0, 0.0]
     x, y = order * WAVELENGTH / PERIOD - light[0], -light[1]
     leaving = to_world @ [x, y, np.sqrt(1.0 - x * x - y * y)]
-    return np.asarray([0.0, 0.0, 9.0] + leaving * 22.0 / leaving[1])
+    return np.asarray([0.0, 0.0, HEIGHT] + leaving * WALL / leaving[1])
 
 
 def on_film(sensor: object, points: np.ndarray) -> np.ndarray:
@@ -88,3 +89,36 @@ def test_orders_fall_where_the_equation_says_and_are_as_bright_as_listed(table: 
         # noise of a spot is about 1 %
         ratio = EFFICIENCIES[order] / EFFICIENCIES[0]
         assert power[order] / power[0] == pytest.approx(ratio, rel=0.04)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("incidence", "orders"), [(0.0, (-1, 0, 1)), (30.0, (-1, 0))])
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+@pytest.mark.usefixtures("some_variant")
+def test_a_laser_through_a_plate_has_its_orders(incidence: float, orders: tuple[int, ...]) -> None:
+    import mitsuba as mi
+
+    from mitsuba_diffraction.scene import load_scene
+
+    given = {"incidence": f"{incidence}", "ambient": "1e-6"} | {
+        "resx": "320", "resy": "150", "spp": "32", "shortest": "531.9", "longest": "532.1",
+    }  # fmt: skip
+    scene = load_scene(SCENES / "laser_through_plate.xml", given)
+    picture = np.array(mi.render(scene, seed=1)).sum(axis=-1)
+    rows, columns = np.indices(picture.shape) + 0.5
+    turn, period, wavelength = np.radians(incidence), 1.0, 0.532
+    across, normal = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    inside = np.arcsin(np.sin(turn) / 1.5)
+    # where the beam, which comes along y, leaves the plate
+    start = 0.4 * (np.tan(turn) - np.tan(inside)) * across
+    for order in orders:
+        x = np.sin(turn) + order * wavelength / period
+        leaving = x * across + np.sqrt(1.0 - x * x) * normal
+        place = start + leaving * (WALL - start[1]) / leaving[1]
+        (here,) = on_film(scene.sensors()[0], np.array([[place[0], WALL, HEIGHT]]))
+        near = (abs(columns - here[0]) < 10) & (abs(rows - here[1]) < 6)
+        brightest = np.argmax(np.where(near, picture, 0.0))
+        found = np.array([columns.flat[brightest], rows.flat[brightest]])
+        # the spot is 2 pixels wide; guided orders add weaker ones beside it
+        np.testing.assert_allclose(found, here, atol=1.6)
+        assert picture.flat[brightest] > 20 * np.median(picture[near])

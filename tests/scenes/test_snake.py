@@ -150,15 +150,14 @@ def test_building_twice_gives_the_same_mesh() -> None:
 
 def test_the_scenes_hold_what_the_generator_makes(committed: tuple[str, Snake]) -> None:
     name, snake = committed
-    positions, normals, uv, faces = load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply")
-    assert uv is not None
-    assert normals is not None
+    read = load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply")
+    faces = read.faces
     # corner by corner: a vertex at the tip belongs to no triangle, and is not read
     made, corners = snake.body, snake.body.faces
     # single precision, and other versions of SciPy's splines
-    np.testing.assert_allclose(positions[faces], made.positions[corners], atol=1e-3)
-    np.testing.assert_allclose(uv[faces], made.uv[corners], atol=1e-4)
-    np.testing.assert_allclose(normals[faces], made.normals[corners], atol=1e-2)
+    np.testing.assert_allclose(read.positions[faces], made.positions[corners], atol=1e-3)
+    np.testing.assert_allclose(read.uv[faces], made.uv[corners], atol=1e-4)
+    np.testing.assert_allclose(read.normals[faces], made.normals[corners], atol=1e-2)
 
 
 def test_pigment_covers_the_whole_body(committed: tuple[str, Snake]) -> None:

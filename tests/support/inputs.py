@@ -10,6 +10,7 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionTable
 from tests.support.directions import rough_patch
+from tests.support.meshes import ply_text
 from tests.support.orders import thin_grating
 
 SCENE = """<scene version="3.0.0"><default name="width" value="4"/>
@@ -25,24 +26,8 @@ SCENE = """<scene version="3.0.0"><default name="width" value="4"/>
 </scene>"""
 LIGHT = """<scene version="3.0.0"><emitter type="envmap">
 <string name="filename" value="sky.exr"/></emitter></scene>"""
-PLY = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-element face 4
-property list uchar int vertex_indices
-end_header
-0 0 0
-1 0 0
-0 1 0
-0 0 1
-3 0 2 1
-3 0 1 3
-3 0 3 2
-3 1 2 3
-"""
+_TETRAHEDRON = (0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)
+PLY = ply_text([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], _TETRAHEDRON, "xyz")
 #: Options of a small table.
 SMALL = "--coherence-width 2 --tolerance 0.05"
 HEIGHTS = f"--pixel-size 0.1 {SMALL}"

@@ -9,6 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from tests.support.meshes import obj_of, ply_text
+
 #: Colours of the logo, most frequent first.
 COLOURS = ((230, 60, 40), (250, 210, 40), (40, 80, 200))
 
@@ -44,14 +46,8 @@ def write_board(file: Path, turn: int = 0, *, with_uv: bool = True) -> None:
     rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     front = (uv - 0.5) @ rotation.T + 0.5
     if file.suffix == ".obj":
-        lines = [f"v {a} {b} {c}" for a, b, c in corners]
-        used = (*front, *(uv * 0.1 + 7)) if with_uv else ()
-        lines += [f"vt {a:.6f} {b:.6f}" for a, b in used]
-        for number, quad in enumerate(quads):
-            first = 1 if number == 0 else 5
-            ends = (f"{v + 1}/{first + k}" if with_uv else f"{v + 1}" for k, v in enumerate(quad))
-            lines.append("f " + " ".join(ends))
-        file.write_text("\n".join(lines) + "\n")
+        used = np.round([*front, *(uv * 0.1 + 7)], 6) if with_uv else ()
+        obj_of(file, corners, quads, used, [range(4), *[range(4, 8)] * 5])
         return
     places = [front if n == 0 else uv * 0.1 + 7 for n in range(len(quads))]
     rows = [
@@ -66,12 +62,7 @@ def write_board(file: Path, turn: int = 0, *, with_uv: bool = True) -> None:
         mesh = trimesh.Trimesh(table[:, :3], faces, visual=visual, process=False)
         trimesh.Scene(mesh).export(file)
         return
-    header = ["ply", "format ascii 1.0", f"element vertex {len(rows)}"]
-    header += [f"property float {name}" for name in ("x", "y", "z", "s", "t")]
-    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
-    lines = [" ".join(f"{value:.6f}" for value in row) for row in rows]
-    lines += [f"3 {a} {b} {c}" for a, b, c in faces]
-    file.write_text("\n".join([*header, *lines]) + "\n")
+    file.write_text(ply_text(rows, faces, "xyzst"))
 
 
 RED = [0.8, 0.1, 0.1]

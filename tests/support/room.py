@@ -56,6 +56,20 @@ SKIN = """<bsdf type="diffraction">
 GRATING = 'generator = "sinusoidal"\n[arguments]\nperiod = 1.6\ndepth = 0.06\nperiods = 3\n'
 
 
+def skin(*more: str) -> str:
+    """`SKIN` with the id `skin`, and more in it."""
+    named = SKIN.replace("<bsdf ", '<bsdf id="skin" ')
+    return named.replace("</bsdf>", f"{''.join(more)}</bsdf>")
+
+
+def scene_file(folder: Path, *elements: str) -> Path:
+    """Write `scene.xml` of some elements, and the recipe of `SKIN`, into a folder."""
+    (folder / "grating.toml").write_text(GRATING)
+    file = folder / "scene.xml"
+    file.write_text(f'<scene version="3.0.0">{"".join(elements)}</scene>')
+    return file
+
+
 def plate_file(folder: Path) -> Path:
     """Write the scene `plate.xml` and its recipe into a folder."""
     (folder / "grating.toml").write_text(GRATING)

@@ -13,7 +13,7 @@ directions   `direction_field`: a smooth field of directions on any mesh
 from __future__ import annotations
 
 from .directions import GUIDES, DirectionField, direction_field
-from .mesh_files import MeshFile, load_mesh, load_orientation, read_mesh, write_ply
+from .mesh_files import MeshFile, load_mesh, read_mesh, write_ply
 from .tangents import TangentReport, check_tangents
 from .trimesh import (
     TriangleMesh,
@@ -26,6 +26,6 @@ from .trimesh import (
 __all__ = [
     "GUIDES", "DirectionField", "MeshFile", "TangentReport", "TriangleMesh", "cell_corners",
     "check_tangents", "direction_field", "directions", "grid_faces", "load_mesh",
-    "load_orientation", "mesh_files", "oriented_mesh", "read_mesh", "tangents",
-    "texture_tangents", "trimesh", "write_ply",
+    "mesh_files", "oriented_mesh", "read_mesh", "tangents", "texture_tangents", "trimesh",
+    "write_ply",
 ]  # fmt: skip

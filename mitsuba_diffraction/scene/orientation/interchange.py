@@ -21,6 +21,7 @@ from ...inputs import note_input
 from ...limits import MOST_PLACED, bounded_memory, check_content, check_count
 from ..meshes import MeshArrays
 from .mesh_indices import check_indices
+from .trimesh import unit
 
 
 def interchange_mesh(file: Path) -> MeshArrays:
@@ -97,8 +98,7 @@ def _placed(
     if np.linalg.det(linear) < 0.0:
         faces = faces[:, ::-1]
     if normals is not None:
-        normals = normals @ np.linalg.inv(linear)
-        normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        normals = unit(normals @ np.linalg.inv(linear))
     return MeshArrays(positions @ linear.T + matrix[:3, 3], normals, uv, faces)
 
 
@@ -179,7 +179,7 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
                 f"and faceVertexIndices {len(corners)}; export the mesh again"
             )
         check_indices(corners, len(points.reshape(-1, 3)), f"mesh '{file}'")
-        faces = _fans(counts)
+        faces = fans(counts)
         if mesh.GetOrientationAttr().Get() == "leftHanded":
             faces = faces[:, ::-1]
         own = geometry.Primvar(mesh.GetNormalsAttr())
@@ -195,7 +195,7 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
         )
 
 
-def _fans(counts: Whole) -> Whole:
+def fans(counts: Whole) -> Whole:
     """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
 
     counts : corners of each polygon.

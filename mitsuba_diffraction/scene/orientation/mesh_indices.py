@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError, counted, quoted
 from ...limits import check_content
 
-#: NumPy's codes of the types of a PLY file.
-CODES = {
+#: Formats of the content of a PLY file.
+FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
+# NumPy's codes of the types of a PLY file
+_CODES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
     "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
@@ -44,16 +46,6 @@ class Element(NamedTuple):
     number: int
     properties: list[list[str]]
 
-    def dtype(self, order: str) -> np.dtype[Any]:
-        """Return the type of a row, whose lists have three numbers, as Mitsuba expects."""
-        fields: list[Any] = []
-        for n, words in enumerate(self.properties):
-            types = [order + CODES[word] for word in words[:-1] if word != "list"]
-            fields.append((f"{n}", types[0]))
-            if words[0] == "list":
-                fields.append((f"{n} values", types[1], (3,)))
-        return np.dtype(fields)
-
 
 class Header(NamedTuple):
     """Header of a PLY file: its format, elements, and the place where its content begins."""
@@ -64,8 +56,37 @@ class Header(NamedTuple):
 
     @property
     def order(self) -> str:
-        """NumPy's code of the order of bytes."""
+        """NumPy's code of the order of bytes in the content."""
         return ">" if self.format == "binary_big_endian" else "<"
+
+    def type_of(self, word: str) -> np.dtype[Any]:
+        """Return the type of the numbers in the content that the file calls by this word."""
+        return np.dtype("<f8" if self.format == "ascii" else self.order + _CODES[word])
+
+    def row(self, element: Element, length: int) -> np.dtype[Any]:
+        """Return the type of a row of an element in the content, whose lists have this length."""
+        fields: list[Any] = []
+        for n, words in enumerate(element.properties):
+            types = [self.type_of(word) for word in words[:-1] if word != "list"]
+            fields.append((f"{n}", types[0]))
+            if words[0] == "list":
+                fields.append((f"{n} values", types[1], (length,)))
+        return np.dtype(fields)
+
+    def content(self, file: Path, shown: str) -> NDArray[np.uint8]:
+        """Return the bytes after the header; those of a text are its numbers in double precision.
+
+        Raises a DiffractionError if a text is not all numbers.
+        """
+        if self.format != "ascii":
+            empty = file.stat().st_size <= self.size
+            return np.empty(0, np.uint8) if empty else np.memmap(file, np.uint8, "r", self.size)
+        with file.open("rb") as stream:
+            stream.seek(self.size)
+            try:
+                return np.fromstring(stream.read(), "<f8", sep=" ").view(np.uint8)
+            except (ValueError, DeprecationWarning) as error:
+                raise DiffractionError(f"{shown}: its text is not all numbers") from error
 
 
 def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> None:
@@ -97,17 +118,13 @@ def any_line_begins(file: Path, word: bytes) -> bool:
         return any(line.lstrip().startswith((word + b" ", word + b"\t")) for line in lines)
 
 
-def ply_header(file: Path, shown: str = "") -> Header | None:
-    """Return the header of a PLY file; None for other files; errors as of `parsed_header`."""
-    with file.open("rb") as stream:
-        return parsed_header(stream.read(_LONGEST_HEADER), shown or f"mesh '{file}'")
-
-
-def parsed_header(start: bytes, shown: str) -> Header | None:
-    """Return the header at the beginning of a PLY file; None for other files.
+def ply_header(file: Path, shown: str) -> Header | None:
+    """Return the header of a PLY file; None for other files.
 
     Raises a DiffractionError if it has no end, or an element has no properties or an unknown type.
     """
+    with file.open("rb") as stream:
+        start = stream.read(_LONGEST_HEADER)
     if not re.match(rb"ply\s", start):
         return None
     form, elements = "", []
@@ -129,7 +146,7 @@ def parsed_header(start: bytes, shown: str) -> Header | None:
         elif words[:1] == ["property"]:
             types = words[2:4] if words[1:2] == ["list"] else words[1:2]
             expected = 5 if words[1:2] == ["list"] else 3
-            if not elements or len(words) < expected or any(word not in CODES for word in types):
+            if not elements or len(words) < expected or any(word not in _CODES for word in types):
                 raise DiffractionError(
                     f"{shown}: {quoted(line.strip())} cannot be a property of a PLY"
                 )
@@ -146,78 +163,34 @@ def parsed_header(start: bytes, shown: str) -> Header | None:
 
 
 def _check_ply(file: Path, shown: str) -> int | None:
+    """Return the number of triangles; None for what Mitsuba refuses, such as polygons."""
     header = ply_header(file, shown)
-    counts = {element.name: element.number for element in header.elements} if header else {}
     if header is None:
         return None
-    if not counts.get("vertex") or not counts.get("face"):
+    elements = {element.name: element for element in header.elements}
+    vertices, face = (elements.get(name, Element(name, 0, [])) for name in ("vertex", "face"))
+    if not vertices.number or not face.number:
         return 0
-    least = sum(e.number * _least_bytes(e, header) for e in header.elements)
-    if header.size + least > file.stat().st_size + 1:  # a text needs no blank at its end
+    content = header.content(file, shown)
+    if sum(e.number * header.row(e, 0).itemsize for e in header.elements) > len(content):
         raise DiffractionError(
             f"{shown}: its {file.stat().st_size} bytes are fewer than its header states "
-            f"({counts['vertex']} vertices, {counted(counts['face'], 'face')}); export the mesh "
-            "again"
+            f"({vertices.number} vertices, {counted(face.number, 'face')}); export the mesh again"
         )
-    rows = _faces(file, header, shown)
-    if rows is None:
-        return None
-    for n, words in enumerate(next(e for e in header.elements if e.name == "face").properties):
+    before = header.elements[: header.elements.index(face)]
+    # lists have three numbers, as Mitsuba expects
+    start, row = sum(e.number * header.row(e, 3).itemsize for e in before), header.row(face, 3)
+    if start + face.number * row.itemsize > len(content):
+        return None  # no triangles alone, or too short
+    rows = np.frombuffer(content, row, face.number, start)
+    for n, words in enumerate(face.properties):
         if words[0] != "list":
             continue
         if (rows[f"{n}"] != 3).any():
-            return None  # polygons, which Mitsuba refuses
+            return None
         if words[2] not in ("float", "float32", "double", "float64") or "vertex" in words[3]:
-            check_indices(rows[f"{n} values"], counts["vertex"], shown)
-    return counts["face"]
-
-
-def _least_bytes(element: Element, header: Header) -> int:
-    """Return the bytes of the shortest row of an element, whose lists are empty."""
-    if header.format == "ascii":
-        return 2 * len(element.properties)
-    return sum(np.dtype(CODES[w[1] if w[0] == "list" else w[0]]).itemsize
-               for w in element.properties)  # fmt: skip
-
-
-def _faces(file: Path, header: Header, shown: str) -> Any:
-    """Return the faces as Mitsuba reads them, if all are triangles; else some rows, or None."""
-    if header.format == "ascii":
-        return _faces_of_text(file, header, shown)
-    start = header.size
-    for element in header.elements:
-        row = element.dtype(header.order)
-        if element.name != "face":
-            start += element.number * row.itemsize
-            continue
-        if start + element.number * row.itemsize > file.stat().st_size:
-            return None  # no triangles alone, or too short
-        return np.memmap(file, row, "r", start, element.number) if element.number else None
-    return None
-
-
-def _faces_of_text(file: Path, header: Header, shown: str) -> Any:
-    """Return the faces of a PLY in text, as a dictionary of columns; None if there are too few."""
-    with file.open("rb") as stream:
-        stream.seek(header.size)
-        try:
-            numbers = np.fromstring(stream.read(), np.float64, sep=" ")
-        except (ValueError, DeprecationWarning) as error:
-            raise DiffractionError(f"{shown}: its text is not all numbers") from error
-    start = 0
-    for element in header.elements:
-        widths = [4 if words[0] == "list" else 1 for words in element.properties]
-        size = element.number * sum(widths)
-        if element.name == "face":
-            if start + size > len(numbers):
-                return None
-            rows = numbers[start : start + size].reshape(element.number, -1)
-            places = np.cumsum([0, *widths])
-            columns = {f"{n}": rows[:, place] for n, place in enumerate(places[:-1])}
-            values = {f"{n} values": rows[:, p + 1 : p + 4] for n, p in enumerate(places[:-1])}
-            return columns | values
-        start += size
-    return None
+            check_indices(rows[f"{n} values"], vertices.number, shown)
+    return face.number
 
 
 def check_indices(corners: NDArray[Any], vertices: int, shown: str) -> None:
@@ -240,17 +213,20 @@ def _check_serialized(file: Path, number: int, shown: str) -> int:
     with file.open("rb") as stream:
         try:
             start, version = _place(stream, size, number)
-            content = _Inflated(stream, start)
-            (flags,) = struct.unpack("<I", content.read(4))
-            if version == 4:
-                _skip_name(content)
-            vertices, faces = struct.unpack("<QQ", content.read(16))
+            stream.seek(start)
+            inflate = zlib.decompressobj()
+            head = inflate.decompress(stream.read(), 4 + _LONGEST_NAME + 16)
+            (flags,) = struct.unpack_from("<I", head)
+            counts = 4 if version == 3 else head.index(b"\0", 4) + 1  # after the name
+            vertices, faces = struct.unpack_from("<QQ", head, counts)
             numbers = 3 + 3 * bool(flags & _NORMALS) + 2 * bool(flags & _UV)
             numbers += 3 * bool(flags & _COLOURS)
             before = vertices * numbers * (8 if flags & _DOUBLE else 4)
             check_content(before + 12 * faces, size, shown)
-            content.skip(before)
-            corners = np.frombuffer(content.read(12 * faces), "<u4")
+            first = counts + 16 + before
+            rest = max(1, first + 12 * faces - len(head))
+            content = head + inflate.decompress(inflate.unconsumed_tail, rest)
+            corners = np.frombuffer(content, "<u4", 3 * faces, first)
         except (struct.error, ValueError, zlib.error) as error:
             if isinstance(error, DiffractionError):
                 raise
@@ -274,43 +250,11 @@ def _place(stream: Any, size: int, number: int) -> tuple[int, int]:
     stream.seek(size - 4)
     (count,) = struct.unpack("<I", stream.read(4))
     width, code = (8, "<Q") if version == 4 else (4, "<I")
-    if number >= count:
+    place = size - 4 - width * (count - number)
+    if number >= count or place < 0:
         raise ValueError
-    stream.seek(size - 4 - width * (count - number))
-    return struct.unpack(code, stream.read(width))[0] + 4, version
-
-
-def _skip_name(content: _Inflated) -> None:
-    for _ in range(_LONGEST_NAME):
-        if content.read(1) == b"\0":
-            return
-    raise ValueError
-
-
-class _Inflated:
-    """Content of a zlib stream, inflated as far as it is read."""
-
-    def __init__(self, stream: Any, start: int) -> None:
-        stream.seek(start)
-        self._stream, self._inflate, self._rest = stream, zlib.decompressobj(), b""
-
-    def read(self, count: int) -> bytes:
-        """Return so many bytes; raises a ValueError if there are fewer."""
-        parts: list[bytes] = []
-        while count:
-            if not self._rest:
-                packed = self._inflate.unconsumed_tail or self._stream.read(1 << 16)
-                self._rest = self._inflate.decompress(packed, 1 << 20)
-                if not packed and not self._rest:
-                    raise ValueError
-            parts.append(self._rest[:count])
-            self._rest = self._rest[count:]
-            count -= len(parts[-1])
-        return b"".join(parts)
-
-    def skip(self, count: int) -> None:
-        """Pass over so many bytes."""
-        while count:
-            step = min(count, 1 << 20)
-            self.read(step)
-            count -= step
+    stream.seek(place)
+    (start,) = struct.unpack(code, stream.read(width))
+    if start >= size:
+        raise ValueError
+    return start + 4, version

@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ...arrays import Real, Whole
 from ..elements import ORIENTATION
-from .trimesh import texture_tangents, unit
+from .trimesh import TriangleMesh, texture_tangents, unit
 
 Bools = NDArray[np.bool_]
 
@@ -63,16 +63,14 @@ def _length_of_breaks(places: Real, faces: Whole, crossed: Bools, jumps: Whole) 
     # edges that follow each other share a corner
     n = len(places)
     graph = coo_array((np.ones(len(edges)), tuple(edges.T)), shape=(n, n))
-    count, of_place = connected_components(graph, directed=False)
-    part = of_place[edges[:, 0]]
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    longest = np.zeros(count)
+    of_place = connected_components(graph, directed=False)[1]
+    parts, part = np.unique(of_place[edges[:, 0]], return_inverse=True)
+    low, high = np.full((len(parts), 3), np.inf), np.full((len(parts), 3), -np.inf)
+    longest = np.zeros(len(parts))
     np.minimum.at(low, part, middles)
     np.maximum.at(high, part, middles)
     np.maximum.at(longest, part, sizes)
-    used = longest > 0
-    extent = np.zeros(count)
-    extent[used] = np.linalg.norm(high[used] - low[used], axis=1)
+    extent = np.linalg.norm(high - low, axis=1)
     size = float(np.ptp(places[faces].reshape(-1, 3), axis=0).max())
     line = extent > np.minimum(_EDGES * longest, _SHARE * size)
 
@@ -100,9 +98,8 @@ class TangentReport:
     """Findings of `check_tangents`; shares are of the surface area, 0 to 1."""
 
     triangles: int  # number of triangles with an area
-    # has_uv, has_normals, has_orientation: whether the mesh carries them
+    # has_uv, has_orientation: whether the mesh carries them
     has_uv: bool
-    has_normals: bool
     degenerate: float  # share whose texture coordinates span no area: no tangent there
     # share where u × v runs the other way round than on most of the surface; which way that is does
     # not matter, and Mitsuba flips v of OBJ files
@@ -115,6 +112,7 @@ class TangentReport:
     broken: float
     size: float  # longest side of the mesh along an axis
     has_orientation: bool = False
+    has_normals: bool = True  # of every mesh: readers make normals where a file has none
 
     @property
     def usable(self) -> bool:
@@ -147,11 +145,6 @@ class TangentReport:
                 "axis shall"
             ]
         lines = []
-        if not self.has_normals:
-            lines.append(
-                "no vertex normals: every triangle reflects like a flat mirror; export smooth "
-                "normals, or write the mesh with the command 'tangents', which adds them"
-            )
         if self.degenerate >= 0.01:
             lines.append(
                 f"{self.degenerate:.0%} of the surface has texture coordinates without area, hence "
@@ -211,20 +204,9 @@ class TangentReport:
         }
 
 
-def check_tangents(
-    positions: Real,
-    normals: Real | None,
-    uv: Real | None,
-    faces: Whole,
-    orientation: Real | None = None,
-) -> TangentReport:
-    """Judge the direction of a patch on a mesh, as Mitsuba will compute it.
-
-    Parameters
-    ----------
-    positions, normals, uv, faces : as from `load_mesh`.
-    orientation : (n, 2) cosine and sine of the angle from dp/du, or None where it is not turned.
-    """
+def check_tangents(mesh: TriangleMesh) -> TangentReport:
+    """Judge the direction of a patch on a mesh, as Mitsuba will compute it."""
+    positions, faces, uv = mesh.positions, mesh.faces, mesh.uv
     sides = positions[faces[:, 1:]] - positions[faces[:, :1]]  # (m, 2, 3)
     across = np.cross(sides[:, 0], sides[:, 1])
     area = np.linalg.norm(across, axis=1) / 2
@@ -232,13 +214,11 @@ def check_tangents(
     faces, sides, across, area = faces[solid], sides[solid], across[solid], area[solid]
     total = area.sum()
     if uv is None or not len(faces):
-        return TangentReport(
-            len(faces), uv is not None, normals is not None, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        )
+        return TangentReport(len(faces), uv is not None, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     dp_du, dp_dv, signed = texture_tangents(sides, uv[faces[:, 1:]] - uv[faces[:, :1]])
     ratio = np.abs(signed) / area
-    outward = across if normals is None else normals[faces].sum(axis=1)
+    outward = mesh.normals[faces].sum(axis=1)
     mirrored = (np.cross(dp_du, dp_dv) * outward).sum(axis=1) < 0
     flat = ~(ratio > FLAT * np.median(ratio))
     good = ~flat
@@ -246,7 +226,9 @@ def check_tangents(
 
     front = across / (2 * area[:, None])
     front *= np.where((front * outward).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-    turn = np.tile([1.0, 0.0], (len(positions), 1)) if orientation is None else orientation
+    turn = mesh.orientation
+    if turn is None:
+        turn = np.tile([1.0, 0.0], (len(positions), 1))
     # vertices are split along seams of the texture, so neighbours are found by position
     places, welded = np.unique(positions, axis=0, return_inverse=True)
     corners = welded.reshape(-1)[faces]
@@ -258,14 +240,13 @@ def check_tangents(
     return TangentReport(
         triangles=len(faces),
         has_uv=True,
-        has_normals=normals is not None,
         degenerate=float(area[flat].sum() / total),
         mirrored=float(min(area[good & side].sum() for side in (mirrored, ~mirrored)) / total),
         turning=float(area[turning].sum() / total),
         stretch=float(np.median(lengths[0] / lengths[1])) if good.any() else 0.0,
         broken=_length_of_breaks(places, corners, crossed, jumps),
         size=float(np.ptp(positions[faces].reshape(-1, 3), axis=0).max()),
-        has_orientation=orientation is not None,
+        has_orientation=mesh.orientation is not None,
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +20,12 @@ _MOST_AT_ONE_PLACE = 64
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Vertices with normals and texture coordinates, and the triangles between them."""
+    """Vertices with normals and mostly texture coordinates, and the triangles between them."""
 
     # positions, normals: (n, 3) floats; normals are unit vectors
     positions: Real
     normals: Real
-    uv: Real  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
+    uv: Real | None  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
     faces: Whole  # (m, 3) integers, counter-clockwise seen from outside
     # (n, 2) floats or None Cosine and sine of the angle by which the patch is turned away from
     # dp/du
@@ -49,8 +48,8 @@ class TriangleMesh:
     def part(self, chosen: NDArray[np.bool_]) -> TriangleMesh:
         """Return the mesh of some triangles, (m,), with their vertices alone."""
         kept, faces = np.unique(self.faces[chosen], return_inverse=True)
-        turns = None if self.orientation is None else self.orientation[kept]
-        positions, normals, uv = self.positions[kept], self.normals[kept], self.uv[kept]
+        uv, turns = (None if a is None else a[kept] for a in (self.uv, self.orientation))
+        positions, normals = self.positions[kept], self.normals[kept]
         return TriangleMesh(positions, normals, uv, faces.reshape(-1, 3), turns)
 
 
@@ -110,22 +109,10 @@ def _shared(normals: Real, places: Whole) -> Real:
     return total
 
 
-class TextureTangents(NamedTuple):
-    """Tangents of triangles by their texture coordinates.
+def texture_tangents(sides: Real, uv_sides: Real) -> tuple[Real, Real, Real]:
+    """Return dp/du and dp/dv (m, 3) of triangles, and their signed areas (m,) in (u, v).
 
-    Attributes
-    ----------
-    dp_du, dp_dv : (m, 3).
-    area : (m,) signed areas in (u, v).
-    """
-
-    dp_du: Real
-    dp_dv: Real
-    area: Real
-
-
-def texture_tangents(sides: Real, uv_sides: Real) -> TextureTangents:
-    """Return the tangents of triangles from two sides of each, in space and in (u, v).
+    sides, uv_sides : (m, 2, 3), (m, 2, 2) two sides of each, in space and in (u, v).
 
     Solves sides = uv_sides · (dp/du, dp/dv); where (u, v) span no area the result is zero.
     """
@@ -134,7 +121,7 @@ def texture_tangents(sides: Real, uv_sides: Real) -> TextureTangents:
     safe = np.where(determinant == 0, np.inf, determinant)[:, None]
     dp_du = (dv1[:, None] * sides[:, 0] - dv0[:, None] * sides[:, 1]) / safe
     dp_dv = (du0[:, None] * sides[:, 1] - du1[:, None] * sides[:, 0]) / safe
-    return TextureTangents(dp_du, dp_dv, determinant / 2)
+    return dp_du, dp_dv, determinant / 2
 
 
 def oriented_mesh(

@@ -132,9 +132,7 @@ def _bin(value: Float, end: float, count: int) -> Any:
     return mi.UInt32(dr.clip(value * (count / end), 0.0, count - 1.0))
 
 
-def light_of_tables(
-    load: Load, sensor: Callable[[Any], Any], paths: int, seed: int = 0
-) -> list[TableLight]:
+def light_of_tables(load: Load, sensor: Callable[[Any], Any], paths: int) -> list[TableLight]:
     """Load a scene and render it; return the light of each table, in the order of loading.
 
     load : loads the scene in the variant that is set, `llvm_ad_spectral` or `cuda_ad_spectral`.
@@ -171,8 +169,8 @@ def light_of_tables(
                 if bsdf.table is factors.table:
                     stack.enter_context(factors.on(bsdf))
         view = sensor(scene)
-        turns = _turns(scene, view, seed)
-        _render(scene, view, paths, seed, made)
+        turns = _turns(scene, view)
+        _render(scene, view, paths, made)
     found = [_light_of(each, turns) for each in made]
     if not any(each.share for each in found):
         raise DiffractionError(
@@ -199,7 +197,7 @@ def _surfaces(scene: Any, made: list[_Factors]) -> dict[int, tuple[str, BSDF]]:
     return found
 
 
-def _render(scene: Any, sensor: Any, paths: int, seed: int, made: list[_Factors]) -> None:
+def _render(scene: Any, sensor: Any, paths: int, made: list[_Factors]) -> None:
     """Compute the derivative of the picture's brightness by all factors.
 
     Raises a DiffractionError if the picture is black.
@@ -211,7 +209,7 @@ def _render(scene: Any, sensor: Any, paths: int, seed: int, made: list[_Factors]
     depth = int(match[1]) if match else -1
     depth = MOST_BOUNCES if depth < 0 else min(max(depth, 1), MOST_BOUNCES)
     integrator: Any = mi.load_dict({"type": "prb", "max_depth": depth})
-    picture = np.array(integrator.render(scene, sensor, seed=seed, spp=spp), np.float64)
+    picture = np.array(integrator.render(scene, sensor, seed=0, spp=spp), np.float64)
     weights = _brightness(sensor.film(), picture.shape[-1])
     brightness = np.maximum(picture @ weights, 0.0)
     if not (lit := brightness > 0.0).any():
@@ -223,7 +221,7 @@ def _render(scene: Any, sensor: Any, paths: int, seed: int, made: list[_Factors]
     gradient = clipped[..., None] * weights / (clipped * brightness).sum()
     integrator.render_backward(
         scene, [each.all for each in made], tensor(gradient),
-        sensor=sensor, seed=seed + 1, spp=spp,
+        sensor=sensor, seed=1, spp=spp,
     )  # fmt: skip
 
 
@@ -254,12 +252,12 @@ def _number(shape: Any) -> int:
     return int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)))[0])
 
 
-def _turns(scene: Any, sensor: Any, seed: int) -> dict[int, float]:
+def _turns(scene: Any, sensor: Any) -> dict[int, float]:
     """Return the median of how far ωi turns between two places of a pixel, by number of the shape.
 
     The turn is in direction cosines.
     """
-    film, rng = sensor.film(), np.random.default_rng(seed)
+    film, rng = sensor.film(), np.random.default_rng(0)
     pixels = np.floor(rng.random((_PAIRS, 2)) * np.array(film.crop_size(), float))
     places = np.repeat(pixels + np.array(film.crop_offset(), float), 2, axis=0)
     places = (places + rng.random(places.shape)) / np.array(film.size(), float)

@@ -57,10 +57,9 @@ def plan_table(light: TableLight, tolerance: float) -> PlannedTable:
     if limit[0] * limit[1] > WORTH * whole.q_limit**2:
         return unlimited
     request = light.request
+    x, y = (float(f"{half:.3g}") for half in limit)  # enough for people; the fourth digit is `ROOM`
     settings = replace(
-        request.settings,
-        frequency_limit=(_rounded(limit[0]), _rounded(limit[1])),
-        height_scale_max=request.height_scale,
+        request.settings, frequency_limit=(x, y), height_scale_max=request.height_scale
     )
     table = request.cached(settings)
     if table.nbytes > WORTH * whole.nbytes:
@@ -97,11 +96,6 @@ def quantiles(values: Any, light: Any, shares: Sequence[float]) -> list[float]:
     flat, weights = np.ravel(values), np.ravel(light)
     found = np.quantile(flat, np.clip(shares, 0.0, 1.0), weights=weights, method="inverted_cdf")
     return list(map(float, found))
-
-
-def _rounded(frequency: float) -> float:
-    """Three digits are enough for people; the fourth is `ROOM`."""
-    return float(f"{frequency:.3g}")
 
 
 def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:

@@ -19,6 +19,7 @@ from mitsuba_diffraction.scene.fitted_mesh import fit_of
 from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mesh
 from mitsuba_diffraction.scene.orientation.trimesh import grid_faces
 from tests.support.hostile import postscript
+from tests.support.meshes import obj_of, ply_text
 
 # a bent sheet, of which no axis and no side looks like another
 U, V = (g.ravel() for g in np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1, 3), indexing="ij"))
@@ -157,17 +158,11 @@ def write_cube(file: Path) -> None:
             f"    int[] faceVertexIndices = {[corner for side in SIDES for corner in side]}\n"
             f"    point3f[] points = [{listed}]\n}}\n"
         )
+        file.write_text(text, encoding="utf-8")
     elif file.suffix == ".obj":  # each polygon has corners of its own
-        rows = [("v", *CORNERS[corner]) for side in SIDES for corner in side]
-        rows += [("f", *range(first, first + 4)) for first in range(1, 25, 4)]
-        text = "\n".join([*(" ".join(map(str, row)) for row in rows), ""])
+        obj_of(file, np.array(CORNERS)[SIDES].reshape(-1, 3), np.arange(24).reshape(6, 4))
     else:
-        head = ["ply", "format ascii 1.0", "element vertex 8"]
-        head += [f"property float {axis}" for axis in "xyz"]
-        head += ["element face 6", "property list uchar int vertex_indices", "end_header"]
-        rows = [*CORNERS, *([4, *side] for side in SIDES)]
-        text = "\n".join([*head, *(" ".join(map(str, row)) for row in rows), ""])
-    file.write_text(text, encoding="utf-8")
+        file.write_text(ply_text(CORNERS, SIDES, "xyz"))
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".ply", ".obj"])
@@ -189,12 +184,11 @@ def test_edges_of_sixty_degrees_between_parts_of_the_texture_are_sharp(
 ) -> None:
     """A tube of a few sides, with texture coordinates of its own on each."""
     angles = 2.0 * np.pi * np.arange(sides) / sides
-    lines = [f"v {np.cos(a)} {np.sin(a)} {z}" for z in (0, 1) for a in angles]
-    lines += ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
+    places = [(np.cos(a), np.sin(a), z) for z in (0, 1) for a in angles]
     ends = [(n, (n + 1) % sides) for n in range(sides)]
-    corners = ((a, b, b + sides, a + sides) for a, b in ends)
-    lines += ["f " + " ".join(f"{c + 1}/{n + 1}" for n, c in enumerate(s)) for s in corners]
-    (tmp_path / "tube.obj").write_text("\n".join([*lines, ""]))
+    polygons = [(a, b, b + sides, a + sides) for a, b in ends]
+    uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    obj_of(tmp_path / "tube.obj", places, polygons, uv, [range(4)] * sides)
     mesh = load_mesh(tmp_path / "tube.obj")
     outwards = (mesh.normals * mesh.positions)[:, :2].sum(axis=1)  # of unit vectors
     np.testing.assert_allclose(outwards, np.cos(np.pi / sides) if sharp else 1.0, atol=1e-6)
@@ -273,6 +267,7 @@ def pigmented(file: Path) -> None:
     mi.load_dict(md.bsdf_dict(flat, material="keratin", pigment=str(file)))
 
 
+@pytest.mark.usefixtures("some_variant")
 @pytest.mark.parametrize("name", SECRETS)
 @pytest.mark.parametrize("part", ["buffers", "images"])
 def test_gltf_reads_files_of_its_own_folder_alone(folder: Path, part: str, name: str) -> None:
@@ -289,6 +284,7 @@ def test_gltf_reads_files_of_its_own_folder_alone(folder: Path, part: str, name:
         read(file)
 
 
+@pytest.mark.usefixtures("some_variant")
 def test_pictures_in_gltf_run_no_program(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
     monkeypatch.setattr(EpsImagePlugin, "Ghostscript", lambda *a, **k: calls.append(a))

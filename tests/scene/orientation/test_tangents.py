@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -13,10 +14,11 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.scene.orientation.directions import direction_field
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
 from tests.support import ROOT
+from tests.support.meshes import ball, obj_of, ring, tube
 
 PLY = b"""ply
 format binary_little_endian 1.0
@@ -43,7 +45,7 @@ def _sheet(n: int = 8) -> Arrays:
 
 
 def test_a_plain_sheet_is_fine() -> None:
-    report = check_tangents(*_sheet())
+    report = check_tangents(TriangleMesh(*_sheet()))
     assert report.usable
     assert report.problems() == []
     assert report.triangles == 128
@@ -53,7 +55,7 @@ def test_a_plain_sheet_is_fine() -> None:
 
 def test_without_texture_coordinates_there_is_no_direction() -> None:
     positions, normals, _, faces = _sheet()
-    report = check_tangents(positions, normals, None, faces)
+    report = check_tangents(TriangleMesh(positions, normals, None, faces))
     assert not report.usable
     assert len(report.problems()) == 1
     assert "no texture coordinates" in report.problems()[0]
@@ -62,7 +64,7 @@ def test_without_texture_coordinates_there_is_no_direction() -> None:
 def test_collapsed_texture_coordinates_are_named() -> None:
     positions, normals, uv, faces = _sheet()
     uv[positions[:, 0] > 0.7] = 0.5
-    report = check_tangents(positions, normals, uv, faces)
+    report = check_tangents(TriangleMesh(positions, normals, uv, faces))
     # two columns of cells, and one triangle of each cell in the column before
     assert report.degenerate == pytest.approx(2.5 / 8)
     assert not report.usable
@@ -72,7 +74,7 @@ def test_collapsed_texture_coordinates_are_named() -> None:
 def test_a_mirrored_half_is_named() -> None:
     positions, normals, uv, faces = _sheet()
     uv[:, 1] = np.abs(uv[:, 1] - 0.5)
-    report = check_tangents(positions, normals, uv, faces)
+    report = check_tangents(TriangleMesh(positions, normals, uv, faces))
     assert report.mirrored == pytest.approx(0.5)
     assert any("mirrored" in line for line in report.problems())
 
@@ -81,7 +83,7 @@ def test_coordinates_that_are_mirrored_everywhere_are_no_problem() -> None:
     """As those of OBJ files, of which Mitsuba flips v."""
     positions, normals, uv, faces = _sheet()
     uv[:, 1] = 1.0 - uv[:, 1]
-    report = check_tangents(positions, normals, uv, faces)
+    report = check_tangents(TriangleMesh(positions, normals, uv, faces))
     assert report.mirrored == 0
     assert not report.problems()
 
@@ -107,12 +109,12 @@ def test_normals_without_length_are_rebuilt_with_a_note(tmp_path, some_variant, 
 def test_stretch_is_the_ratio_of_the_tangents() -> None:
     positions, normals, uv, faces = _sheet()
     uv[:, 0] /= 3
-    assert check_tangents(positions, normals, uv, faces).stretch == pytest.approx(3)
+    assert check_tangents(TriangleMesh(positions, normals, uv, faces)).stretch == pytest.approx(3)
 
 
 @pytest.mark.parametrize("name", ["elaphe", "xenopeltis"])
 def test_the_snakes_are_usable(name: str) -> None:
-    report = check_tangents(*load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply"))
+    report = check_tangents(load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply"))
     assert report.usable
     assert report.problems() == []
 
@@ -163,11 +165,16 @@ def test_any_bytes_after_a_ply_header_are_read_or_refused(
     assert "\n" not in str(caught.value)
 
 
+def arrays_of(mesh: TriangleMesh) -> tuple[Any, ...]:
+    """Its arrays but the orientation."""
+    return mesh.positions, mesh.normals, mesh.uv, mesh.faces
+
+
 def test_a_written_mesh_reads_back(tmp_path: Path) -> None:
     positions, normals, uv, faces = _sheet(2)
     write_ply(tmp_path / "sheet.ply", TriangleMesh(positions, normals, uv, faces), "a sheet")
     read = load_mesh(tmp_path / "sheet.ply")
-    for before, after in zip((positions, normals, uv, faces), read, strict=True):
+    for before, after in zip((positions, normals, uv, faces), arrays_of(read), strict=True):
         np.testing.assert_array_equal(before, after)
 
 
@@ -178,10 +185,18 @@ def test_vertices_of_no_triangle_are_left_out(tmp_path: Path) -> None:
     arrays = (np.insert(a, 3, 1000.0, axis=0) for a in (positions, normals, uv))
     mesh = TriangleMesh(*arrays, faces + (faces >= 3), np.insert(turns, 3, 0.5, axis=0))
     write_ply(tmp_path / "sheet.ply", mesh)
-    read = read_mesh(tmp_path / "sheet.ply")
-    for before, after in zip((positions, normals, uv, faces), read.mesh, strict=True):
+    read = load_mesh(tmp_path / "sheet.ply")
+    for before, after in zip((positions, normals, uv, faces), arrays_of(read), strict=True):
         np.testing.assert_array_equal(before, after)
     np.testing.assert_array_equal(read.orientation, turns)
+
+
+def test_other_attributes_may_have_any_name(tmp_path: Path) -> None:
+    positions, normals, uv, faces = _sheet(2)
+    turns = np.tile([0.0, 1.0], (len(positions), 1))
+    write_ply(file := tmp_path / "a.ply", TriangleMesh(positions, normals, uv, faces, turns))
+    file.write_bytes(file.read_bytes().replace(b"float t\n", b"float \xe9_0\n"))  # not UTF-8
+    np.testing.assert_array_equal(load_mesh(file).orientation, turns)
 
 
 def test_arrays_that_do_not_fit_are_refused() -> None:
@@ -200,15 +215,14 @@ def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
     corners = [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 2)]
     polygons = [(0, 1, 2, 3), (0, 1, 2, 4, 3)]
     kind = {"ascii": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
-    extra = "" if order == "ascii" else "property uchar red\n"
     header = (
         f"ply\nformat {kind} 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
-        f"property double z\nelement face 2\n{extra}property list uchar int vertex_indices\n"
-        "end_header\n"
+        "property double z\nelement face 2\nproperty uchar red\nproperty list uchar int "
+        "vertex_indices\nend_header\n"
     ).encode()
     if order == "ascii":
         rows = [" ".join(map(str, [*corner, 0])) for corner in corners]
-        rows += [" ".join(map(str, [len(p), *p])) for p in polygons]
+        rows += [" ".join(map(str, [7, len(p), *p])) for p in polygons]
         body = "\n".join(rows).encode() + b"\n"
     else:
         body = b"".join(struct.pack(f"{order}ffd", *corner, 0) for corner in corners)
@@ -216,67 +230,47 @@ def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
             struct.pack(f"{order}BB{len(p)}i", 7, len(p), *p) for p in polygons
         )  # fmt: skip
     (tmp_path / "polygons.ply").write_bytes(header + body)
-    lines = [f"v {x} {y} 0" for x, y in corners]
-    lines += ["f " + " ".join(str(n + 1) for n in p) for p in polygons]
-    (tmp_path / "polygons.obj").write_text("\n".join(lines) + "\n")
+    obj_of(tmp_path / "polygons.obj", [(x, y, 0.0) for x, y in corners], polygons)
     ours, theirs = (load_mesh(tmp_path / f"polygons.{kind}") for kind in ("ply", "obj"))
-    np.testing.assert_array_equal(ours[0][ours[3]], theirs[0][theirs[3]])
+    np.testing.assert_array_equal(ours.positions[ours.faces], theirs.positions[theirs.faces])
     # cut short, it is refused as any damaged file
     (tmp_path / "short.ply").write_bytes((header + body)[:-8])
     with pytest.raises(DiffractionError, match="cannot be read"):
         load_mesh(tmp_path / "short.ply")
 
 
-def test_a_damaged_mesh_is_named_once_with_its_mistake(tmp_path):
+@pytest.mark.parametrize(
+    ("corners", "mistake"),
+    [
+        ("1 2 99", "reference to invalid vertex 99"),
+        ("-3 -2 -1", "it names vertex -3, counted back from the last, which Mitsuba does not read"),
+    ],
+)
+def test_a_damaged_mesh_is_named_once_with_its_mistake(tmp_path, corners, mistake):
     file = tmp_path / "bad.obj"
-    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n")
+    file.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf {corners}\n")
     with pytest.raises(DiffractionError) as caught:
         load_mesh(file)
     assert str(caught.value).count("bad.obj") == 1
-    assert "cannot be read: reference to invalid vertex 99; export it again" in str(caught.value)
+    assert f"cannot be read: {mistake}; export it again" in str(caught.value)
 
 
 def report_of(positions, normals, faces, along, smoothing=0.03):
     """What is found on a mesh that `tangents` makes."""
     field = direction_field(positions, normals, faces, along, smoothing=smoothing)
     mesh = oriented_mesh(positions, normals, faces, field.directions)
-    return check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces, mesh.orientation)
+    return check_tangents(mesh)
 
 
-def ring(n, m):
-    """A torus around z of radii 1 and 0.42."""
-    i, j = (
-        2 * np.pi * k.ravel() / most for k, most in zip(np.indices((n, m)), (n, m), strict=True)
-    )
-    out = np.stack([np.cos(i), np.sin(i), 0 * i], axis=1)
-    normals = np.cos(j)[:, None] * out + np.sin(j)[:, None] * [0.0, 0.0, 1.0]
-    number = np.pad(np.arange(n * m).reshape(n, m), ((0, 1), (0, 1)), mode="wrap")
-    return out + 0.42 * normals, normals, grid_faces(number)
-
-
-def tube(n, m):
-    """An open cylinder around z of radius 1 and height 3; the x axis is between vertices."""
-    i, j = (k.ravel() for k in np.indices((n, m + 1)))
-    angle = 2 * np.pi * (i + 0.5) / n
-    normals = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-    number = np.pad(np.arange(n * (m + 1)).reshape(n, m + 1), ((0, 1), (0, 0)), mode="wrap")
-    return normals + np.outer(3.0 * j / m, [0.0, 0.0, 1.0]), normals, grid_faces(number)
-
-
-def ball(n):
-    """Of radius 1, with one vertex at each pole."""
-    i, j = (k.ravel() for k in np.indices((n + 1, 2 * n + 1)))
-    theta, phi = np.pi * i / n, np.pi * (j % (2 * n)) / n
-    p = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
-    p = np.round(p, 12) + 0.0
-    return p, p, grid_faces(np.arange(len(p)).reshape(n + 1, 2 * n + 1))
+#: Of a ring.
+RADII = (1.0, 0.42)
 
 
 # a field that is smooth over 0.28 breaks where it is smallest: measured, 0.06 further in
 @pytest.mark.parametrize(("smoothing", "moved"), [(0.001, 0.0), (0.03, 0.0), (0.1, 0.06)])
 @pytest.mark.parametrize("cells", [(24, 16), (60, 40)])
 def test_a_ring_along_its_axis_breaks_along_two_circles(cells, smoothing, moved):
-    report = report_of(*ring(*cells), "z", smoothing)
+    report = report_of(*ring(*cells, radii=RADII), "z", smoothing)
     # half a cell beside the circles of radius 1, which are polygons
     assert report.broken < 4 * np.pi
     assert report.broken == pytest.approx(4 * np.pi, rel=0.42 * np.pi / cells[1] + 0.01 + moved)
@@ -291,11 +285,13 @@ def test_a_tube_across_its_axis_breaks_along_two_lines(cells):
     assert report_of(*tube(*cells), "x").broken == pytest.approx(6.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("mesh", [ring(48, 24), tube(48, 20)])
+@pytest.mark.parametrize("mesh", [ring(48, 24, radii=RADII), tube(48, 20)])
 def test_a_smooth_field_does_not_break(mesh):
     report = report_of(*mesh, "smooth")
     assert report.broken == 0.0
     assert report.usable
+    assert report.problems() == []
+    assert report.stretch == pytest.approx(1)  # of coordinates that are made with the field
 
 
 @pytest.mark.parametrize("cells", [20, 32])
@@ -311,11 +307,11 @@ def test_a_seam_of_the_texture_is_as_long_however_fine_the_mesh(cells):
     faces[right] += len(positions)  # where u runs along y
     uv = np.concatenate([uv, np.stack([uv[:, 1], -uv[:, 0]], axis=1)])
     two = np.tile(positions, (2, 1)), np.tile(normals, (2, 1))
-    report = check_tangents(*two, uv, faces)
+    report = check_tangents(TriangleMesh(*two, uv, faces))
     assert report.broken == pytest.approx(1.0)
     # one triangle in each cell on both sides of the seam
     assert report.turning == pytest.approx(2 * 0.5 / cells)
     assert not report.usable
     # turned back by the orientation, nothing is left of it
     back = np.repeat([[1.0, 0.0], [0.0, -1.0]], len(positions), axis=0)
-    assert check_tangents(*two, uv, faces, back).usable
+    assert check_tangents(TriangleMesh(*two, uv, faces, back)).usable
