@@ -145,7 +145,7 @@ class Renderer:
         frame.clear(0.0, 0.0, 0.0, 0.0)
         self.draw_lights(
             method, frame, camera or self.camera, self.lights, definitions,
-            {"sky": np.asarray(self.sky, np.float32)},
+            {"sky": np.asarray(self.sky, np.float32), "surroundings_lit": (1.0, 1.0)},
         )  # fmt: skip
 
     def progressive(
@@ -195,7 +195,6 @@ class Renderer:
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
         extras: Sequence[Sequence[Bindings]] = (),
-        each: Sequence[dict[str, Uniform]] = (),
         textures: Mapping[str, Any] | None = None,
         windings: Sequence[int] = (),
     ) -> None:
@@ -206,7 +205,7 @@ class Renderer:
         method, frame, camera : as in `draw`.
         lights : lights without extent.
         definitions, uniforms, textures : definitions, uniforms and textures of the light.
-        extras, each : further bindings, and uniforms, of each surface.
+        extras : further bindings of each surface.
         windings : of each surface whose triangles that face away are hidden; 0 for others.
         """
         tables = self.tables(method)
@@ -234,7 +233,7 @@ class Renderer:
             unit = 0
             for part in parts:
                 unit = part.use(program, unit)
-            unit = bind(program, each[n] if each else {}, textures or {}, unit)
+            unit = bind(program, {}, textures or {}, unit)
             self.use_responses(program, unit, lights)
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)

@@ -264,6 +264,7 @@ class _Writer:
         return {
             "name": surface.scene.name,
             "emits": surface.scene.radiance is not None,
+            "lamp": surface.scene.lamp,
             "height_scale": None if described is None else described.height_scale.number,
             "table": surface.table or 0,
             "programs": {m: self._program(m, d) for m, d in definitions.items()},

@@ -1,6 +1,6 @@
 """Light of a page: lights, a sequence that represents all emitters, and the surroundings.
 
-The surroundings are an environment, shapes that emit light, and data to look them up along lobes.
+The surroundings are an environment, and data to look light up along lobes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..glsl.packed_scene import PackedScene
 from ..glsl.packing import WAVENUMBERS, pack_responses
 from ..glsl.source import plain_source
 from ..glsl.texels import shortened
-from .sections import Sections, converted, packed_array, packed_mesh, packed_parts
+from .sections import Sections, converted, packed_array, packed_parts
 
 #: Number of lights in the sequence; their mean is the scene's light.
 SAMPLES = 256
@@ -112,11 +112,6 @@ def packed_surroundings(
         "bounces": bounces,
         "parts": packed_parts(parts, sections),
         "lobes": [packed_parts(part, sections) for part in lobes],
-        "emitting": [
-            {"mesh": packed_mesh(glow.vertices, sections), "radiance": glow.radiance.tolist()}
-            for glow in packed.scene.emitting
-        ],
-        "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
     }, {name: text for part in (parts, *lobes) for name, text in part.definitions.items()}
 
