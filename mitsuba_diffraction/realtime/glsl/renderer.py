@@ -73,7 +73,7 @@ class Renderer:
         self._programs: dict[object, Any] = {}
         self._arrays: dict[object, Any] = {}
         self._responses: Bindings | None = None
-        self._stage: Stage | None = None
+        self._stage: Stage | None = None  # emitters and surroundings, built at their first use
         self._spectra: list[NDArray[np.float64]] = []
 
     def _warn(self, omissions: Sequence[str]) -> None:
@@ -174,17 +174,11 @@ class Renderer:
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
+        self._stage = self._stage or Stage(self.context, self.packed, self.buffers)
         draw = functools.partial(self.draw_lights, method)
         return ProgressiveLight(
-            self.stage(), draw, resized, lights=lights, shadow_size=shadow_size,
-            bounces=bounces,
-        )  # fmt: skip
-
-    def stage(self) -> Stage:
-        """Return the scene's emitters, surroundings and shadow casters, built at the first call."""
-        if self._stage is None:
-            self._stage = Stage(self.context, self.packed, self.buffers)
-        return self._stage
+            self._stage, draw, resized, lights=lights, shadow_size=shadow_size, bounces=bounces
+        )
 
     def draw_lights(
         self,

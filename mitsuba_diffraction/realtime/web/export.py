@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import base64
-import functools
 import html
 import json
 import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
 from ...progress import Progress, silent
-from ..glsl.methods import WEB_METHODS, refusal
+from ..glsl.methods import WEB_METHODS, check_methods, refusal
 from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene
@@ -96,11 +94,7 @@ def make_page(
     bounces : add light between surfaces, which takes seconds to trace.
     progress : called as progress(done, total, text).
     """
-    unknown = [method for method in methods if method not in WEB_METHODS]
-    if unknown or not methods or len(set(methods)) < len(methods):
-        raise DiffractionError(
-            f"methods={list(methods)!r}: choose from {', '.join(WEB_METHODS)}, each at most once"
-        )
+    check_methods(methods, WEB_METHODS)
     check_choice("view", view, VIEWS)
     if title is None:
         is_file = isinstance(scene, str | os.PathLike)
@@ -148,21 +142,20 @@ class Viewer:
 
 def _filled(header: dict[str, Any], data: bytes) -> str:
     """Fill the template of the page."""
+
+    def file(name: str) -> str:
+        """Read a file of the page."""
+        return shader_file(f"page/{name}", __package__)
+
     # "</script" would end the element of the header, and "<!--<script" its end
     text = json.dumps(header, ensure_ascii=False).replace("<", "\\u003c")
     parts = {
-        "style": _asset("style.css"),
-        "script": "\n".join(_asset(name) for name in _SCRIPTS),
+        "style": file("style.css"),
+        "script": "\n".join(map(file, _SCRIPTS)),
         "header": text,
         "data": base64.b64encode(data).decode(),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("page.html"))
-
-
-@functools.cache
-def _asset(name: str) -> str:
-    """Read a file of the page."""
-    return resources.files(__package__).joinpath("page", name).read_text(encoding="utf-8")
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], file("page.html"))
 
 
 @dataclass(frozen=True)

@@ -99,8 +99,7 @@ def packed_surroundings(
         return None, {}
     parts = packed.around | converted(packed.obstacles, {"obstacles": _coarser})
     if bounces:
-        # path-traced means of few paths have noise of more than the ninth digit
-        parts |= converted(packed.bounces, {"bounces": _eight_digits})
+        parts |= packed.bounces
     # rounding adds no bias: shaders divide by the rounded densities
     digits: dict[str, Any] = {"lobe_places": np.float16, "lobe_densities": shortened}
     lobes = [converted(part, digits) for part in packed.lobes]
@@ -114,11 +113,6 @@ def packed_surroundings(
         "lobes": [packed_parts(part, sections) for part in lobes],
         "background": background,
     }, {name: text for part in (parts, *lobes) for name, text in part.definitions.items()}
-
-
-def _eight_digits(values: NDArray[Any]) -> NDArray[np.float16]:
-    """Round half floats, which have eleven binary digits, to eight."""
-    return shortened(values).astype(np.float16)
 
 
 def _coarser(obstacles: NDArray[Any]) -> NDArray[np.uint8]:
