@@ -76,11 +76,12 @@ class Trace:
 
 
 def _operator(
-    operation: str, neutral: float | None, *, swapped: bool = False
+    operation: str, neutral: float | None = None, *, swapped: bool = False, kind: str = "float"
 ) -> Callable[[Any, Any], Any]:
     """Return a method of `Symbol` for an operator, which leaves its neutral number out.
 
     swapped : whether the symbol is on the right.
+    kind : of the result.
     """
 
     def method(self: Symbol, other: Any) -> Any:
@@ -88,14 +89,10 @@ def _operator(
             return NotImplemented
         if neutral is not None and _is(other, neutral):
             return self
-        return _node(operation, other, self) if swapped else _node(operation, self, other)
+        operands = (other, self) if swapped else (self, other)
+        return _node(operation, *operands, kind=kind)
 
     return method
-
-
-def _condition(operation: str) -> Callable[[Any, Any], Any]:
-    """Return a method of `Symbol` whose result is a condition."""
-    return lambda self, other: _node(operation, self, other, kind="bool")
 
 
 class Symbol:
@@ -118,7 +115,7 @@ class Symbol:
     __add__, __radd__ = _operator("+", 0.0), _operator("+", 0.0, swapped=True)
     __mul__, __rmul__ = _operator("*", 1.0), _operator("*", 1.0, swapped=True)
     __sub__, __truediv__ = _operator("-", 0.0), _operator("/", 1.0)
-    __rtruediv__ = _operator("/", None, swapped=True)
+    __rtruediv__ = _operator("/", swapped=True)
 
     def __rsub__(self, other: Any) -> Any:
         return -self if _is(other, 0.0) else _node("-", other, self)
@@ -132,9 +129,10 @@ class Symbol:
     def __abs__(self) -> Any:
         return _node("abs", self)
 
-    __lt__, __le__, __gt__, __ge__ = map(_condition, ("<", "<=", ">", ">="))
-    __eq__, __ne__ = map(_condition, ("==", "!="))
-    __and__, __or__ = map(_condition, ("&&", "||"))
+    __lt__, __le__, __gt__, __ge__, __eq__, __ne__, __and__, __or__ = (
+        _operator(operation, kind="bool")
+        for operation in ("<", "<=", ">", ">=", "==", "!=", "&&", "||")
+    )
 
     def __invert__(self) -> Any:
         return _node("!", self, kind="bool")
