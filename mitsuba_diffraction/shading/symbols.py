@@ -75,9 +75,24 @@ class Trace:
             self.pair.real.name, last.name = f"{name}_re", f"{name}_im"
 
 
-def _condition(operation: str) -> Callable[[Any, Any], Any]:
-    """Return a method of `Symbol` whose result is a condition."""
-    return lambda self, other: _node(operation, self, other, kind="bool")
+def _operator(
+    operation: str, neutral: float | None = None, *, swapped: bool = False, kind: str = "float"
+) -> Callable[[Any, Any], Any]:
+    """Return a method of `Symbol` for an operator, which leaves its neutral number out.
+
+    swapped : whether the symbol is on the right.
+    kind : of the result.
+    """
+
+    def method(self: Symbol, other: Any) -> Any:
+        if isinstance(other, Complex):
+            return NotImplemented
+        if neutral is not None and _is(other, neutral):
+            return self
+        operands = (other, self) if swapped else (self, other)
+        return _node(operation, *operands, kind=kind)
+
+    return method
 
 
 class Symbol:
@@ -97,37 +112,13 @@ class Symbol:
         self.kind, self.operation, self.parts, self.trace = kind, operation, parts, trace
         self.name: str | None = None
 
-    def __add__(self, other: Any) -> Any:
-        if isinstance(other, Complex):
-            return NotImplemented
-        return self if _is(other, 0.0) else _node("+", self, other)
-
-    def __radd__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else _node("+", other, self)
-
-    def __sub__(self, other: Any) -> Any:
-        if isinstance(other, Complex):
-            return NotImplemented
-        return self if _is(other, 0.0) else _node("-", self, other)
+    __add__, __radd__ = _operator("+", 0.0), _operator("+", 0.0, swapped=True)
+    __mul__, __rmul__ = _operator("*", 1.0), _operator("*", 1.0, swapped=True)
+    __sub__, __truediv__ = _operator("-", 0.0), _operator("/", 1.0)
+    __rtruediv__ = _operator("/", swapped=True)
 
     def __rsub__(self, other: Any) -> Any:
         return -self if _is(other, 0.0) else _node("-", other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        if isinstance(other, Complex):
-            return NotImplemented
-        return self if _is(other, 1.0) else _node("*", self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return self if _is(other, 1.0) else _node("*", other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        if isinstance(other, Complex):
-            return NotImplemented
-        return self if _is(other, 1.0) else _node("/", self, other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return _node("/", other, self)
 
     def __neg__(self) -> Any:
         return _node("neg", self)
@@ -138,9 +129,10 @@ class Symbol:
     def __abs__(self) -> Any:
         return _node("abs", self)
 
-    __lt__, __le__, __gt__, __ge__ = map(_condition, ("<", "<=", ">", ">="))
-    __eq__, __ne__ = map(_condition, ("==", "!="))
-    __and__, __or__ = map(_condition, ("&&", "||"))
+    __lt__, __le__, __gt__, __ge__, __eq__, __ne__, __and__, __or__ = (
+        _operator(operation, kind="bool")
+        for operation in ("<", "<=", ">", ">=", "==", "!=", "&&", "||")
+    )
 
     def __invert__(self) -> Any:
         return _node("!", self, kind="bool")

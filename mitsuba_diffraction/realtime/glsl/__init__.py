@@ -17,7 +17,7 @@ shadows        shadow maps, and the triangles that cast shadows
 surroundings   environments, flat lights and obstacles, which lobes look up
 bounces        light between surfaces on a grid
 progressive    accumulation of frames, each with one light or with looked-up surroundings
-camera         sensors as cameras; moving the camera and the light by hand
+camera         sensors as cameras
 packing        tables as textures
 texels         textures, uniforms and definitions that a shader reads; packing of numbers
 methods        tables and programs of each method, also of the thesis' methods

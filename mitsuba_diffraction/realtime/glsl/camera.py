@@ -1,4 +1,4 @@
-"""Cameras of OpenGL from Mitsuba's sensors; moving a camera and a light by hand."""
+"""Cameras of OpenGL from Mitsuba's sensors."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ An emitter e is chosen with a probability p_e proportional to its irradiance in 
 scene, and a point on it with a density p:
 
 - directions, points and spots are lights without extent;
-- skies, suns and environment maps yield a direction, drawn in proportion to their radiance, and the
-  irradiance L/(p p_e), which is the same all over the scene;
+- skies, suns and environment maps yield a direction, drawn about in proportion to their radiance,
+  and the irradiance L/(p p_e), which is the same all over the scene;
 - area lights yield a point, drawn evenly over their area, and the intensity L/(p p_e) along the
   normal, which is proportional to the cosine. The estimate is unbiased at every point of the scene.
 
@@ -41,18 +41,16 @@ from .lights import (
     area_of,
     sampled_directions,
     sampled_positions,
-    scaled,
-    spectra_along,
     without_extent,
 )
-from .surroundings import Environment, beside, is_flat
+from .surroundings import Environment, is_flat
 
 #: Refusal of a scene in the dark.
 NO_LIGHT = "no emitter of the scene lights the surfaces that diffract; add one, or brighten it"
 
 _BLOCK = 256  # lights that an emitter draws at a time
+_FIRST = 2  # first number of an environment's sequence, from which on a few lights are even, too
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-_SUN_SHARE = 0.625  # share of a sky's lights that are directions of its sun
 _EVEN = 0.1  # share of choices independent of the irradiance in the middle, for lights elsewhere
 
 
@@ -161,8 +159,8 @@ class _LightSequence:
         return float(np.mean([max(irradiance, 0.0) for irradiance in irradiances]))
 
     def _block(self, start: int) -> list[Lamp]:
-        """Draw a block of lights from number `start` on."""
-        name = name_of(self.emitter)
+        """Draw a block of lights from number `start` on, by Mitsuba's sampling of the emitter."""
+        name, normals, address = name_of(self.emitter), np.zeros((_BLOCK, 3)), 0
         if self._area:
             values, places, normals, waves = sampled_positions(self.emitter, _BLOCK, start)
             points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
@@ -170,9 +168,13 @@ class _LightSequence:
             densities = np.full(_BLOCK, 1.0 / area_of(shape) if is_flat(shape) else 0.0)
             address = int(shape.ptr)
         else:
-            values, places, densities, waves = self._environment_block(start)
-            points, normals = np.pad(places, [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
-            address = 0
+            assert self._environment is not None
+            values, directions, _, waves = sampled_directions(
+                self.emitter, self._middle, _BLOCK, _FIRST + start
+            )
+            points = np.pad(directions, [(0, 0), (0, 1)])
+            of_sky = ~self._environment.in_sun(directions)
+            densities = of_sky * of_sky.mean() * self._environment.density(directions)
         return [
             Lamp(
                 name, point, waves, value, normal, density=float(density), shape=address
@@ -181,42 +183,6 @@ class _LightSequence:
                 points, values, normals, densities, strict=True
             )
         ]  # fmt: skip
-
-    def _environment_block(self, start: int) -> tuple[Real, Real, Real, Real]:
-        """Draw a block of directions of an environment.
-
-        Five in eight are directions of the sun, if the sky has one. The sun's share of the light is
-        larger, but the rest of the sky, all the light in the sun's shadow, needs more directions.
-
-        Returns irradiances as of `sampled_directions`, directions (n, 3), densities (n,) as in
-        `Light.density`, and wavelengths in nm.
-        """
-        assert self._environment is not None
-        of_sun, sunward = self._sun_block(start)
-        count = _BLOCK - len(sunward)
-        directions, drawn = self._environment.draw(start, count)
-        sky, waves = spectra_along(self.emitter, beside(self._environment.sun, directions))
-        sky = scaled(sky, _BLOCK / count / np.maximum(drawn, 1e-12))
-        # directions of sun and sky alternate evenly
-        order = np.argsort(np.argsort(np.arange(_BLOCK) * _GOLDEN % 1.0))
-        values = np.concatenate([sky, of_sun])
-        directions = np.concatenate([directions, sunward])
-        densities = count / _BLOCK * self._environment.density(directions[:count])
-        looked_up = np.append(densities, np.zeros(len(sunward)))
-        return values[order], directions[order], looked_up[order], waves
-
-    def _sun_block(self, start: int) -> tuple[Real, Real]:
-        """Draw irradiances and directions of the sun's part of a block; empty without a sun."""
-        assert self._environment is not None
-        samples = 4 * _BLOCK if self._environment.sun.any() else 1
-        values, directions, *_ = sampled_directions(self.emitter, self._middle, samples, 4 * start)
-        lit = values.reshape(samples, -1).any(axis=1)
-        inside = np.flatnonzero(self._environment.in_sun(directions) & lit)
-        count = int(_SUN_SHARE * _BLOCK) if len(inside) else 0
-        chosen = inside[np.linspace(0, len(inside) - 1, count).astype(int)]
-        total = values[inside].sum() / samples
-        factor = _BLOCK * total / max(float(values[chosen].sum()), 1e-30)
-        return values[chosen] * factor, directions[chosen]
 
 
 def emission(light: Lamp, direction: Real) -> float:

@@ -16,7 +16,7 @@ from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Surface
 from ...tables import write_channels
 from .maps import Map
-from .methods import method_tables
+from .methods import check_methods, method_tables
 from .packing import pack_responses
 from .rewriting import global_names, renamed, shader_file
 from .shader_materials import (
@@ -130,10 +130,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     methods : methods of `EXPORTED`, each at most once.
     """
     described = SHADER.described(bsdf)
-    if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(EXPORTED):
-        raise DiffractionError(
-            f"methods={list(methods)!r}: choose from {', '.join(EXPORTED)}, each at most once"
-        )
+    check_methods(methods, EXPORTED)
     surface = packed_by(described)
     material = ShaderMaterial(Map(np.zeros(3)), surface)
     common = pack_surface(material) | pack_conservation(material)

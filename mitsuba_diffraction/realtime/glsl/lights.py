@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...optics.colour import daylight
@@ -154,7 +153,7 @@ def _mean_sample(
     """
     values, directions, distances, wavelengths = sampled_directions(emitter, point, samples)
     if sun is not None:
-        values = scaled(values, directions @ sun > _SUN_COSINE)
+        values = (values.T * (directions @ sun > _SUN_COSINE)).T
     weight = values.reshape(samples, -1).sum(axis=1)
     total = weight.sum()
     share = weight / total if total > 0.0 else np.full(len(weight), 1.0 / len(weight))
@@ -224,17 +223,6 @@ def sampled_positions(emitter: Any, samples: int, start: int = 0) -> tuple[Real,
 
 def radiance_along(emitter: Any, directions: Real) -> Real:
     """Return the radiance of an environment from directions (n, 3), linear sRGB (n, 3)."""
-    values, waves = spectra_along(emitter, directions)
-    if values.ndim == 3:
-        return values[:, 0]
-    return values @ np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
-
-
-def spectra_along(emitter: Any, directions: Real) -> tuple[Real, Real]:
-    """Return the spectral radiance of an environment from directions (n, 3).
-
-    Returns values as of `sampled_directions`, and the wavelengths in nm.
-    """
     import drjit as dr
     import mitsuba as mi
 
@@ -242,7 +230,10 @@ def spectra_along(emitter: Any, directions: Real) -> tuple[Real, Real]:
     si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
     si.wi = mi.Vector3f(*lanes.uploaded(-directions))
     lanes.set_wavelengths(si)
-    return lanes.spectra(emitter.eval(si))
+    values, waves = lanes.spectra(emitter.eval(si))
+    if values.ndim == 3:
+        return values[:, 0]
+    return values @ np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
 
 
 def area_of(shape: Any) -> float:
@@ -254,11 +245,6 @@ def emitted_radiance(shape: Any) -> Real:
     """Return the mean radiance that a shape emits, linear sRGB (3,)."""
     values, _, _, waves = sampled_positions(shape.emitter(), 64)
     return daylight_colour(waves, values.mean(axis=0) / area_of(shape))
-
-
-def scaled(values: Real, factors: NDArray[Any]) -> Real:
-    """Return spectra of samples (samples, ...), each times its factor (samples,)."""
-    return np.asarray((values.T * factors).T)
 
 
 class _Lanes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -61,6 +61,18 @@ def method_of(name: str) -> ShaderMethod:
     """Return a method; raises a DiffractionError if it is unknown."""
     check_choice("method", name, tuple(METHODS))
     return METHODS[name]
+
+
+def check_methods(methods: Sequence[str], known: Iterable[str]) -> None:
+    """Check that methods are some of the known ones, each once.
+
+    Raises a DiffractionError that lists the known ones.
+    """
+    known = list(known)
+    if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(known):
+        raise DiffractionError(
+            f"methods={list(methods)!r}: choose from {', '.join(known)}, each at most once"
+        )
 
 
 def refusal(name: str, described: Surface) -> str | None:

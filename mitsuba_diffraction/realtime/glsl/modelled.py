@@ -14,15 +14,14 @@ from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Feature, Surface
 from ...tables.colour.table import cached_colours
-from ...tables.directional import FINE, DirectionalTable
+from ...tables.directional import DirectionalTable
 from .lobes import colour_power, pack_lobes
 from .maps import evaluated
 from .packing import (
-    pack_beneath,
     pack_boundary,
     pack_colours,
     pack_conductor,
-    pack_energy,
+    pack_directions,
     pack_powers,
 )
 from .texels import Packed, Uniform
@@ -65,11 +64,8 @@ class Modelled:
     def conservation(self, scales: Sequence[float]) -> Packed:
         """Pack energy conservation and the base's light, one page per height scale."""
         excesses = [self.described.albedo_excess(scale) for scale in scales]
-        beneath = pack_beneath([excess for excess in excesses if excess is not None])
         pages = [self.described.energy_scale(scale) for scale in scales]
-        if all(page is None for page in pages):
-            return beneath
-        return beneath | pack_energy([FINE.ones if s is None else luminous_mean(s) for s in pages])
+        return pack_directions(excesses, [None if s is None else luminous_mean(s) for s in pages])
 
     def tables(self, method: str) -> Packed:
         """Pack the table for `fast` or `exact`."""

@@ -96,7 +96,7 @@ class PackedScene:
     def looks_up(self) -> bool:
         """Whether lobes can look up any direct light."""
         environment = self.emitters is not None and self.emitters.environment is not None
-        return self.scene.glows or environment
+        return environment or any(s.radiance is not None for s in self.scene.surfaces)
 
     @cached_property
     def around(self) -> Packed:
@@ -104,7 +104,7 @@ class PackedScene:
         assert self.emitters is not None
         extent = float(np.ptp([self.scene.low, self.scene.high]))
         packed = pack_flats(self._flats, self.emitters.share_of)
-        packed |= Packed((), {"least_distance": 1e-6 * extent, "surroundings_lit": (1.0, 1.0)})
+        packed |= Packed((), {"least_distance": 1e-6 * extent})
         if (environment := self.emitters.environment) is not None:
             packed |= environment.packed(self.emitters.share_of(environment.emitter))
         return packed

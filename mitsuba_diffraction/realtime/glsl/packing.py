@@ -27,12 +27,13 @@ from ...tables import DiffractionTable
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.directional import FINE, SHARE, DirectionalTable
-from .texels import Packed, Texture, as_half, listed, paired
+from .texels import Packed, Texture, as_half, four_channels, listed, paired
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
 
 _LAM = np.arange(360.0, 830.5, 1.0)  # nm
+_HALVES = 6e4  # half floats end at 65504
 _RESPONSES = 2048  # nodes over k, about 0.4 nm apart
 _ANGLES, _WAVELENGTHS = 129, 64  # nodes of a conductor's reflectance
 
@@ -44,12 +45,13 @@ def pack_colours(table: ColourTable) -> Packed:
     counts = np.array(grid.counts)
     # floats are exact up to 2²⁴: larger tables exceed the textures
     rings = np.stack([starts[:-1], counts[:-1], counts[1:], counts[1:]], axis=1)
-    radii, zs = table.order_0.shape[:2]
+    glossy = four_channels(table.order_0[..., :3].astype(np.float32))
+    brightest = max(float(np.abs(glossy).max()), 1e-30)
     return Packed(
         textures=(
             listed("colours", paired(table.coefficients).reshape(-1, 4)),
             listed("rings", rings.astype(np.float32)),
-            listed("glossy", paired(_with_next(table.order_0[..., :3]))),
+            Texture("glossy", (glossy * (_HALVES / brightest)).astype(np.float16)),
         ),
         uniforms={
             "bins": grid.bins,
@@ -59,8 +61,8 @@ def pack_colours(table: ColourTable) -> Packed:
             "interval_length": table.expansion.length,
             "intervals": table.expansion.intervals,
             "inverse_scale": 1.0 / table.scale,
-            "glossy_steps": ((radii - 1) / table.radius_end, (zs - 1) / table.z_max),
-            "glossy_size": (radii, zs),
+            "glossy_ends": (table.z_max, table.radius_end),
+            "glossy_scale": brightest / _HALVES,
             "area_factor": area_factor(table.sigma),
             "sigma_0": table.sigma_0,
             "channel_wavenumbers": tuple(wavenumber(RGB_WAVELENGTHS).tolist()),
@@ -68,13 +70,6 @@ def pack_colours(table: ColourTable) -> Packed:
         definitions={"ORDER_0": ""}
         | ({"COHERENT": ""} if table.expansion.kind == "amplitude" else {}),
     )
-
-
-def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Put each colour of order 0 (radii, zs, 3) beside the next z, padded: (n, 8)."""
-    following = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
-    pairs = np.concatenate([values, following, np.zeros((*values.shape[:2], 2))], axis=-1)
-    return np.asarray(pairs.reshape(-1, 8))
 
 
 def pack_powers(table: DiffractionTable) -> Packed:
@@ -115,36 +110,35 @@ def area_factor(sigma: float) -> float:
     return 4.0 * math.pi * sigma**2
 
 
-def pack_energy(scales: Sequence[NDArray[np.float32]]) -> Packed:
-    """Pack the scales that conserve energy, one page per height scale; empty without scales.
+def pack_directions(
+    excesses: Sequence[DirectionalTable | None], scales: Sequence[NDArray[np.float32] | None]
+) -> Packed:
+    """Pack what depends on one direction, one page per height scale; empty without any.
 
-    scales : s on a grid of directions, (polar + 1, azimuthal) each (`Diffraction.energy_scale`).
+    excesses : albedo less the flat interface's reflectance (`Surface.albedo_excess`), which
+        light has that reaches the base beneath; None without a base.
+    scales : s on a grid of directions, (polar + 1, azimuthal) each, which conserve energy
+        (`Surface.energy_scale`); None for 1.
     """
-    if not scales:
+    given = {"BENEATH": excesses, "ENERGY_CONSERVING": scales}
+    definitions = {name: "" for name, pages in given.items() if any(p is not None for p in pages)}
+    if not definitions:
         return Packed()
-    values = np.stack(list(scales))
-    right = np.roll(values, -1, axis=2)
-    corners = [values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:]]
-    return Packed(
-        (listed("energy", np.stack(corners, axis=-1).reshape(-1, 4)),),
-        {"energy_page": 0.0},
-        {"ENERGY_CONSERVING": ""} | _grid(len(values)),
-    )
-
-
-def pack_beneath(excesses: Sequence[DirectionalTable]) -> Packed:
-    """Pack the light that reaches the base beneath, one page per height scale.
-
-    excesses : albedo less the flat interface's reflectance (`Surface.albedo_excess`).
-    """
-    if not excesses:
-        return Packed()
-    values = np.zeros((len(excesses), FINE.polar + 1, FINE.azimuthal, 4), np.float16)
-    for page, excess in zip(values, excesses, strict=True):
-        shares = daylight_shares(excess.wavelengths)
-        page[..., :3] = np.tensordot(excess.on(FINE).values, shares, (0, 0))
-    texture = Texture("beneath", values.reshape(-1, *values.shape[2:]), smooth=True)
-    return Packed((texture,), {"energy_page": 0.0}, {"BENEATH": "", **_grid(len(excesses))})
+    values = np.zeros((len(scales), *FINE.ones.shape, 4), np.float16)
+    for page, excess, scale in zip(values, excesses, scales, strict=True):
+        if excess is not None:
+            shares = daylight_shares(excess.wavelengths)
+            page[..., :3] = np.tensordot(excess.on(FINE).values, shares, (0, 0))
+        if scale is not None:
+            page[..., 3] = scale - 1.0  # half floats are finer near 0
+    definitions |= {
+        "GRID_PAGES": str(len(values)),
+        "GRID_POLAR": str(FINE.polar),
+        "GRID_AZIMUTHAL": str(FINE.azimuthal),
+        "GRID_SHARE": repr(float(SHARE)),
+    }
+    texture = Texture("directions", values.reshape(-1, *values.shape[2:]), smooth=True)
+    return Packed((texture,), {"energy_page": 0.0}, definitions)
 
 
 def daylight_weights(wavelengths: Real, relative: Real | float = 1.0) -> Real:
@@ -160,16 +154,6 @@ def daylight_weights(wavelengths: Real, relative: Real | float = 1.0) -> Real:
 def _daylight(wavelengths: bytes) -> Real:
     """Return linear sRGB (n, 3) of daylight's wavelengths in nm, the bytes of an array (n,)."""
     return np.asarray(linear_srgb(response(np.frombuffer(wavelengths))))
-
-
-def _grid(pages: int) -> dict[str, str]:
-    """Return the definitions of a grid of directions with one page per height scale."""
-    return {
-        "GRID_PAGES": str(pages),
-        "GRID_POLAR": str(FINE.polar),
-        "GRID_AZIMUTHAL": str(FINE.azimuthal),
-        "GRID_SHARE": repr(float(SHARE)),
-    }
 
 
 def pack_responses(lights: Sequence[tuple[Real, Real]]) -> Packed:
@@ -240,13 +224,10 @@ def pack_boundary(model: Model, roughness: RoughnessTable) -> Packed:
         return Packed((), {}, name)
     statistic = model.statistic(roughness)
     nodes = statistic.nodes.astype(np.float32)
-    pairs = np.zeros((len(nodes) - 1, 4), np.float32)
-    pairs[:, 0], pairs[:, 1] = nodes[:-1], nodes[1:]
     return Packed(
-        (listed("statistic", pairs),),
+        (Texture("statistic", nodes[None, :, None]),),
         {
             "first_octave": statistic.first,
-            "last_node": float(len(nodes) - 1),
             "channel_wavenumbers": tuple(wavenumber(RGB_WAVELENGTHS).tolist()),
         },
         {**name, "STATISTIC": "", "NODES_PER_OCTAVE": f"{NODES_PER_OCTAVE}.0"},

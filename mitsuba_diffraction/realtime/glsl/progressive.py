@@ -2,7 +2,7 @@
 
 Two kinds of frames alternate. The first draws one light with its shadows (`emitters`, `shadows`).
 The second looks up the surroundings along each pixel's lobes (`surroundings`), and draws the
-background and shapes that emit light. The balance heuristic weights the two. Every frame samples
+background and emitted light. The balance heuristic weights the two. Every frame samples
 another point of each pixel and of the lens, so that edges become smooth with the light. On request,
 frames of the second kind add light that surfaces send to each other (`bounces`).
 """
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...arrays import Real
 from ...errors import DiffractionError
 from .camera import Camera
-from .context import Bindings, ShaderPass, Target, VertexBuffer, compile_plain, set_uniforms
+from .context import Bindings, ShaderPass, Target, VertexBuffer
 from .emitters import NO_LIGHT
 from .lights import Lamp
 from .packed_scene import PackedScene
@@ -44,13 +44,13 @@ class Stage:
     """
 
     def __init__(self, context: Any, packed: PackedScene, buffers: list[VertexBuffer]) -> None:
-        self.context, self._packed, self._scene = context, packed, packed.scene
+        self.context, self._packed = context, packed
         self._bounces: Bindings | None = None
         self._resources: list[Any] = []
         if packed.emitters is None:
             raise DiffractionError(NO_LIGHT)
         self.emitters = packed.emitters
-        self._add_glowing(buffers)
+        self.casters = self._register(Casters(context, packed.scene, buffers))
         self._around = self._bound(packed.around)
         self._obstacles = self._bound(packed.obstacles)
         self._lobes = [self._bound(lobes) for lobes in packed.lobes]
@@ -72,14 +72,6 @@ class Stage:
         bindings: Bindings = self._register(Bindings(self.context, packed))
         return bindings
 
-    def _add_glowing(self, buffers: list[VertexBuffer]) -> None:
-        """Add shapes that emit light, both as pictures and as shadow casters."""
-        context, scene = self.context, self._scene
-        self._glow = self._register(compile_plain(context, "surface.vert", "glow.frag"))
-        vertices = [self._register(VertexBuffer(context, g.vertices)) for g in scene.emitting]
-        self._glowing = [self._register(v.array(self._glow)) for v in vertices]
-        self.casters = self._register(Casters(context, scene.surfaces, buffers, vertices))
-
     def extras(self, bounces: bool) -> list[list[Bindings]]:
         """Return the bindings of each surface: surroundings, lobes, and light between surfaces."""
         shared = [self._around, self._obstacles]
@@ -92,23 +84,19 @@ class Stage:
         ]
 
     def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
-        """Clear a framebuffer and draw background and emitters; unless `bright`, in black."""
-        matrix = camera.view_projection(self._scene.low, self._scene.high)
+        """Clear a framebuffer and, if `bright`, draw the background."""
         frame.use()
         frame.clear(0.0, 0.0, 0.0, 0.0)
-        shared: dict[str, Uniform] = {
-            "view_projection": tuple(matrix.T.ravel().tolist()),
-            "from_clip": tuple(np.linalg.inv(matrix).T.ravel().tolist()),
-            "eye": tuple(camera.eye.tolist()),
-            "picture_size": tuple(float(n) for n in camera.size),
-        }
         if bright and self._background is not None:
-            self._background.draw(self._around.uniforms | shared, self._around.textures)
-        self.context.enable_only(self.context.DEPTH_TEST)
-        set_uniforms(self._glow, shared)
-        for array, glow in zip(self._glowing, self._scene.emitting, strict=True):
-            set_uniforms(self._glow, {"radiance": tuple((bright * glow.radiance).tolist())})
-            array.render()
+            scene = self._packed.scene
+            from_clip = np.linalg.inv(camera.view_projection(scene.low, scene.high))
+            uniforms: dict[str, Uniform] = {
+                **self._around.uniforms,
+                "from_clip": tuple(from_clip.T.ravel().tolist()),
+                "eye": tuple(camera.eye.tolist()),
+                "picture_size": tuple(float(n) for n in camera.size),
+            }
+            self._background.draw(uniforms, self._around.textures)
 
     def release(self) -> None:
         for resource in reversed(self._resources):
@@ -178,37 +166,25 @@ class ProgressiveLight:
 
     def _light(self, light: Lamp, camera: Camera, shift: Real) -> None:
         """Draw one light with its shadows."""
-        if not len(self._visible.places):
-            return
-        uniforms, each = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
+        uniforms = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
         uniforms["light_density"] = light.density
         definitions = {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
             definitions["WEIGHTED"] = ""
         textures = {"shadow_map": self._map.texture}
-        self._draw_surfaces(light, camera, definitions, uniforms, each, textures)
+        self._draw(
+            self._frame.frame, camera, [light], definitions, uniforms, self._surroundings,
+            textures, self._visible.windings,
+        )  # fmt: skip
 
     def _look_up(self, camera: Camera, numbers: Real) -> None:
         """Draw the surroundings that each pixel's lobes look up."""
-        uniforms: dict[str, Uniform] = {"sequence": tuple(numbers.tolist())}
-        each: list[dict[str, Uniform]] = [{} for _ in self._visible.windings]
-        self._draw_surfaces(_WHITE, camera, {"LOOKED_UP": ""}, uniforms, each, {})
-
-    def _draw_surfaces(
-        self,
-        light: Lamp,
-        camera: Camera,
-        definitions: dict[str, str],
-        uniforms: dict[str, Uniform],
-        each: list[dict[str, Uniform]],
-        textures: dict[str, Any],
-    ) -> None:
-        """Draw all surfaces with the definitions, uniforms and textures of a kind of frame."""
-        for surface, winding in zip(each, self._visible.windings, strict=True):
-            surface["solid"] = winding != 0
+        uniforms: dict[str, Uniform] = {
+            "sequence": tuple(numbers.tolist()), "surroundings_lit": (1.0, 1.0),
+        }  # fmt: skip
         self._draw(
-            self._frame.frame, camera, [light], definitions, uniforms, self._surroundings, each,
-            textures, self._visible.windings,
+            self._frame.frame, camera, [_WHITE], {"LOOKED_UP": ""}, uniforms, self._surroundings,
+            {}, self._visible.windings,
         )  # fmt: skip
 
     @property

@@ -73,7 +73,7 @@ class Renderer:
         self._programs: dict[object, Any] = {}
         self._arrays: dict[object, Any] = {}
         self._responses: Bindings | None = None
-        self._stage: Stage | None = None
+        self._stage: Stage | None = None  # emitters and surroundings, built at their first use
         self._spectra: list[NDArray[np.float64]] = []
 
     def _warn(self, omissions: Sequence[str]) -> None:
@@ -145,7 +145,7 @@ class Renderer:
         frame.clear(0.0, 0.0, 0.0, 0.0)
         self.draw_lights(
             method, frame, camera or self.camera, self.lights, definitions,
-            {"sky": np.asarray(self.sky, np.float32)},
+            {"sky": np.asarray(self.sky, np.float32), "surroundings_lit": (1.0, 1.0)},
         )  # fmt: skip
 
     def progressive(
@@ -174,17 +174,11 @@ class Renderer:
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
+        self._stage = self._stage or Stage(self.context, self.packed, self.buffers)
         draw = functools.partial(self.draw_lights, method)
         return ProgressiveLight(
-            self.stage(), draw, resized, lights=lights, shadow_size=shadow_size,
-            bounces=bounces,
-        )  # fmt: skip
-
-    def stage(self) -> Stage:
-        """Return the scene's emitters, surroundings and shadow casters, built at the first call."""
-        if self._stage is None:
-            self._stage = Stage(self.context, self.packed, self.buffers)
-        return self._stage
+            self._stage, draw, resized, lights=lights, shadow_size=shadow_size, bounces=bounces
+        )
 
     def draw_lights(
         self,
@@ -195,7 +189,6 @@ class Renderer:
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
         extras: Sequence[Sequence[Bindings]] = (),
-        each: Sequence[dict[str, Uniform]] = (),
         textures: Mapping[str, Any] | None = None,
         windings: Sequence[int] = (),
     ) -> None:
@@ -206,7 +199,7 @@ class Renderer:
         method, frame, camera : as in `draw`.
         lights : lights without extent.
         definitions, uniforms, textures : definitions, uniforms and textures of the light.
-        extras, each : further bindings, and uniforms, of each surface.
+        extras : further bindings of each surface.
         windings : of each surface whose triangles that face away are hidden; 0 for others.
         """
         tables = self.tables(method)
@@ -234,7 +227,7 @@ class Renderer:
             unit = 0
             for part in parts:
                 unit = part.use(program, unit)
-            unit = bind(program, each[n] if each else {}, textures or {}, unit)
+            unit = bind(program, {}, textures or {}, unit)
             self.use_responses(program, unit, lights)
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)

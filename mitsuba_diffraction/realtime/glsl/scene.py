@@ -161,15 +161,19 @@ _ANALYTIC = {
 
 @dataclass(frozen=True)
 class SceneSurface:
-    """A shape that reflects light: triangles and material."""
+    """A shape that reflects or emits light: triangles and material."""
 
     name: str  # name in messages
     # (n, 17) attributes of `VERTEX`; three consecutive vertices are a triangle
     vertices: NDArray[np.float32]
     material: ShaderMaterial
     shape: Any  # shape of Mitsuba
-    exact: bool  # whether all of its material is supported
     radiance: Real | None = None  # (3,) linear sRGB, mean emitted radiance; None without light
+
+    @property
+    def lamp(self) -> bool:
+        """Whether the shape emits light and reflects none."""
+        return self.radiance is not None and self.material.black
 
     @property
     def table(self) -> Any:
@@ -179,30 +183,16 @@ class SceneSurface:
 
 
 @dataclass(frozen=True)
-class Glow:
-    """A shape that emits light and reflects none."""
-
-    vertices: NDArray[np.float32]  # (n, 17) attributes of `VERTEX`
-    radiance: Real  # (3,) linear sRGB, mean emitted radiance
-
-
-@dataclass(frozen=True)
 class RealtimeScene:
     """The supported parts of a scene, in world space."""
 
     surfaces: tuple[SceneSurface, ...]
     camera: Camera
     lighting: Lighting
-    low: Real  # (3,) lowest corner of a box around all surfaces
+    low: Real  # (3,) lowest corner of a box around all surfaces that reflect light
     high: Real  # (3,) highest corner
     omissions: tuple[str, ...]  # parts that are left out or simplified, in a few words each
-    emitting: tuple[Glow, ...] = ()  # shapes that emit light and reflect none
     of_light: tuple[str, ...] = ()  # omissions that progressive light does support
-
-    @property
-    def glows(self) -> bool:
-        """Whether any shape emits light."""
-        return bool(self.emitting) or any(s.radiance is not None for s in self.surfaces)
 
     @property
     def diffracting(self) -> tuple[Diffracting, ...]:
@@ -285,26 +275,20 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
             "cylinder a <bsdf type='diffraction'>"
         )
     lighting = read_lights(scene, 0.5 * np.add(*box_of(subjects)), LIGHTS)
-    surfaces, emitting = [], []
+    surfaces = []
     for name, shape, triangles in supported:
-        before = len(omissions)
         materials = read_materials(shape.bsdf(), omissions, name, lighting.mean_spectrum)
-        exact = len(omissions) == before
         radiance = emitted_radiance(shape) if shape.is_emitter() else None
-        if radiance is not None and all(material.black for material in materials):
-            emitting.append(Glow(_vertices(triangles, materials[0], shape), radiance))
-            continue
         # the surfaces of a mix share the triangles, and each is drawn where it has a weight
         for material in materials:
             vertices = _vertices(triangles, material, shape)
-            surfaces.append(SceneSurface(name, vertices, material, shape, exact, radiance))
-    low, high = box_of([s.vertices[:, :3] for s in surfaces])
+            surfaces.append(SceneSurface(name, vertices, material, shape, radiance))
+    low, high = box_of([s.vertices[:, :3] for s in surfaces if not s.lamp])
     lens = ("the lens (shown as a pinhole)",) if camera.lens > 0.0 else ()
     of_light = (*lens, *lighting.omissions)
     return RealtimeScene(
-        tuple(surfaces), camera, lighting, low, high, (*omissions, *of_light), tuple(emitting),
-        of_light,
-    )  # fmt: skip
+        tuple(surfaces), camera, lighting, low, high, (*omissions, *of_light), of_light
+    )
 
 
 def _check_texcoords(shape: Any, name: str) -> None:

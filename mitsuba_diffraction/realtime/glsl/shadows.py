@@ -5,8 +5,7 @@ a camera. Directional lights have parallel projections, points have perspective 
 shifted by a part of a texel, so that the edges of shadows average over frames.
 
 Of a closed surface, only the triangles that face away from the light are drawn. They hide all that
-the others hide, and no lit point lies on them: drawing costs half as much, and lit points cannot be
-in the shadow of their own triangles.
+the others hide: drawing costs half as much.
 """
 
 from __future__ import annotations
@@ -22,15 +21,13 @@ from ...arrays import Real
 from .camera import Camera, box_corners
 from .context import Target, VertexBuffer, compile_plain, enable_sides, set_uniforms
 from .lights import Lamp
-from .scene import SceneSurface
+from .scene import RealtimeScene
 from .texels import Uniform
 
 _GLANCES = 192  # pixels along the longer side of the picture that determines the visible part
 _SAME = 1e-6  # distance of points that are equal, relative to the scene's extent
 _BITS = 21  # bits of a coordinate in units of that distance
-# depth bias in texels, least and largest, and its ratio to the slope of a surface's normals within
-# a triangle, by which neighbouring triangles differ in depth
-_BIAS, _BENT = (0.05, 0.75), 8.0
+_BIAS = 0.75  # depth bias, texels: neighbouring triangles differ in slope
 
 #: Texels a side of a shadow map.
 SIZE = 1024
@@ -50,88 +47,65 @@ class Visible:
 
 @dataclass(frozen=True)
 class Solid:
-    """Extent, orientation and flatness of a surface's triangles."""
+    """Extent and orientation of a surface's triangles."""
 
     low: Real  # (3,) lowest corner of a box around the surface
     high: Real  # (3,) highest corner
     # 1: closed, and triangles are counter-clockwise from outside; −1: clockwise; 0: open
     winding: int
-    bias: float  # depth bias, texels
 
     @classmethod
-    def analyse(cls, triangles: Real, normals: Real) -> Solid:
-        """Analyse triangles (n, 3, 3) with shading normals (n, 3, 3)."""
-        low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-        bias = float(np.clip(_BENT * _bend(triangles, normals), *_BIAS))
-        return cls(low, high, _winding(triangles), bias)
+    def analyse(cls, triangles: Real) -> Solid:
+        """Analyse triangles (n, 3, 3)."""
+        return cls(triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1)), _winding(triangles))
 
-    def encloses(self, place: Real) -> bool:
-        """Return whether a point lies in the surface's box."""
-        return bool(np.all((place >= self.low) & (place <= self.high)))
+    def from_outside(self, place: Real) -> int:
+        """Return the winding, 0 if a place (position and 1, or direction and 0) is in the box."""
+        inside = (place[:3] >= self.low) & (place[:3] <= self.high)
+        return 0 if place[3] and inside.all() else self.winding
 
 
 class Casters:
     """Triangles of a scene that cast shadows, drawn by their positions alone.
 
     buffers : vertex buffers of the surfaces.
-    emitting : vertex buffers of shapes that only emit light; they shade only directional lights.
     """
 
-    def __init__(
-        self,
-        context: Any,
-        surfaces: Sequence[SceneSurface],
-        buffers: Sequence[VertexBuffer],
-        emitting: Sequence[VertexBuffer] = (),
-    ) -> None:
-        self.context = context
+    def __init__(self, context: Any, scene: RealtimeScene, buffers: Sequence[VertexBuffer]) -> None:
+        self.context, self._surfaces = context, scene.surfaces
         self.program = compile_plain(context, "surface.vert", "position.frag")
         self._arrays = [buffer.array(self.program) for buffer in buffers]
-        self._emitting = [buffer.array(self.program) for buffer in emitting]
-        vertices = [s.vertices[:, :6].reshape(-1, 3, 6).astype(np.float64) for s in surfaces]
-        self._shapes = [int(s.shape.ptr) for s in surfaces]
-        self.solids = [Solid.analyse(v[..., :3], v[..., 3:]) for v in vertices]
-        # corners of a box around all
-        self.low = np.min([solid.low for solid in self.solids], axis=0)
-        self.high = np.max([solid.high for solid in self.solids], axis=0)
-        self.corners = box_corners(self.low, self.high)
+        corners = (s.vertices[:, :3].reshape(-1, 3, 3).astype(np.float64) for s in scene.surfaces)
+        self.solids = [Solid.analyse(triangles) for triangles in corners]
+        self.low, self.high = scene.low, scene.high
+        self.corners = box_corners(scene.low, scene.high)
 
     def draw(self, matrix: Real) -> None:
-        """Draw all surfaces with a matrix (4, 4) from the scene to clip space."""
-        self.context.enable_only(self.context.DEPTH_TEST)
-        set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
-        for array in self._arrays:
-            array.render()
+        """Draw what reflects light, with a matrix (4, 4) from the scene to clip space."""
+        parts = [None if surface.lamp else 0 for surface in self._surfaces]
+        self._draw(matrix, parts)
 
-    def draw_map(self, matrix: Real, light: Lamp, visible: Visible) -> list[float]:
-        """Draw a shadow map into the current framebuffer.
-
-        Returns the depth bias of each surface in texels.
-        """
-        set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
-        parts = [
-            "none" if shape == light.shape else _needed(solid, light, winding != 0)
-            for solid, winding, shape in zip(
-                self.solids, visible.windings, self._shapes, strict=True
-            )
-        ]
-        for array, solid, part in zip(self._arrays, self.solids, parts, strict=True):
-            if part == "none":
-                continue
+    def draw_map(self, matrix: Real, light: Lamp, visible: Visible) -> None:
+        """Draw a shadow map; lamps shade directional lights alone, and no shape its own."""
+        parts: list[int | None] = []
+        for surface, solid, winding in zip(
+            self._surfaces, self.solids, visible.windings, strict=True
+        ):
+            shades = surface.shape.ptr != light.shape and not (surface.lamp and light.place[3])
             # the map looks along its z axis, which reverses the triangles' orientation
-            enable_sides(self.context, solid.winding if part == "away" else 0)
-            array.render()
-        self.context.enable_only(self.context.DEPTH_TEST)
-        if light.place[3] == 0.0:
-            for array in self._emitting:
+            parts.append((winding and solid.from_outside(light.place)) if shades else None)
+        self._draw(matrix, parts)
+
+    def _draw(self, matrix: Real, windings: Sequence[int | None]) -> None:
+        """Draw surfaces by their windings as of `enable_sides`, and leave out those with None."""
+        set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
+        for array, winding in zip(self._arrays, windings, strict=True):
+            if winding is not None:
+                enable_sides(self.context, winding)
                 array.render()
-        return [
-            solid.bias if part == "all" else _BIAS[0]
-            for solid, part in zip(self.solids, parts, strict=True)
-        ]
 
     def visible(self, camera: Camera) -> Visible:
-        """Determine the part of the scene that a camera sees."""
+        """Determine the part of the scene that a camera sees; all of it where that is empty."""
         longest = max(camera.size)
         width, height = (max(1, round(_GLANCES * n / longest)) for n in camera.size)
         target = Target(self.context, width, height)
@@ -141,11 +115,12 @@ class Casters:
         pixels = target.read()[::-1].reshape(-1, 4).astype(float)
         target.release()
         places = np.asarray(pixels[pixels[:, 3] > 0.0, :3], np.float64)
-        windings = [0 if s.encloses(camera.eye) else s.winding for s in self.solids]
-        return Visible(places, outline(places), windings)
+        places = places if len(places) else self.corners
+        eye = np.append(camera.eye, 1.0)
+        return Visible(places, outline(places), [s.from_outside(eye) for s in self.solids])
 
     def release(self) -> None:
-        for thing in (*self._arrays, *self._emitting, self.program):
+        for thing in (*self._arrays, self.program):
             thing.release()
 
 
@@ -155,21 +130,6 @@ def outline(places: Real) -> Real:
         return np.asarray(places[scipy.spatial.ConvexHull(places).vertices])
     except (scipy.spatial.QhullError, ValueError):
         return np.unique(places, axis=0)
-
-
-def _needed(solid: Solid, light: Lamp, from_outside: bool) -> str:
-    """Return the triangles that a map needs: "all", or those facing "away" from the light."""
-    inside = light.place[3] > 0.0 and solid.encloses(light.place[:3])
-    return "away" if from_outside and not inside else "all"
-
-
-def _bend(triangles: Real, normals: Real) -> float:
-    """Return the slope of normals relative to their triangle, the quantile 0.999."""
-    flat = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    along = np.abs(np.einsum("ni,nci->nc", flat, normals))
-    across = np.linalg.norm(np.cross(flat[:, None], normals), axis=2)
-    slopes = across / np.maximum(along, 1e-30)
-    return float(np.quantile(slopes[along.min(axis=1) > 0.0].ravel(), 0.999, method="higher"))
 
 
 def _winding(triangles: Real) -> int:
@@ -201,15 +161,11 @@ class ShadowMap:
         self.texture.filter = (context.NEAREST, context.NEAREST)
         self._frame = context.framebuffer(depth_attachment=self.texture)
 
-    def draw(
-        self, light: Lamp, visible: Visible, shift: tuple[float, float]
-    ) -> tuple[dict[str, Uniform], list[dict[str, Uniform]]]:
+    def draw(self, light: Lamp, visible: Visible, shift: tuple[float, float]) -> dict[str, Uniform]:
         """Draw the map of a light, and return uniforms of shaders/shadow.glsl.
 
         visible : part of the scene that the map covers.
         shift : displacement of the map in texels, 0 to 1.
-
-        Returns uniforms of all surfaces, and uniforms of each surface.
         """
         if light.place[3] == 0.0:
             matrix, scale = parallel_view(
@@ -219,18 +175,18 @@ class ShadowMap:
             matrix, scale = self._perspective(light.place[:3], visible, shift)
         self._frame.use()
         self._frame.clear(depth=1.0)
-        biases = self.casters.draw_map(matrix, light, visible)
+        self.casters.draw_map(matrix, light, visible)
         cone = (0.0, 0.0)
         if light.cone is not None:
             cone = light.cone[0], 1.0 / max(light.cone[0] - light.cone[1], 1e-6)
-        shared: dict[str, Uniform] = {
+        return {
             "light_axis": tuple(float(x) for x in light.axis),
             "light_cone": cone,
             "shadow_matrix": tuple(matrix.T.ravel().tolist()),
             "shadow_planes": tuple(np.linalg.inv(matrix).ravel().tolist()),
+            "shadow_bias": _BIAS * scale,
             "shadow_steepest": _STEEPEST * scale,
         }
-        return shared, [{"shadow_bias": bias * scale} for bias in biases]
 
     def _perspective(
         self, eye: Real, visible: Visible, shift: tuple[float, float]

@@ -40,7 +40,6 @@ _LARGEST = (512, 1024)  # most rows and columns
 _SUN_RADIUS = np.radians(0.2679)  # Mitsuba's radius of the sun
 _AROUND_SUN = np.radians(0.6)  # radius around the sun that only drawn lights represent
 _FLATS = 12  # largest number of flat shapes
-_PLASTIC = [0.8191725134, 0.6710436067, 0.5497004779]  # sequence of three numbers (Roberts 2018)
 
 
 def pack_obstacles(triangles: Real) -> Packed:
@@ -127,39 +126,11 @@ class Environment:
         return np.asarray(directions @ self.sun > np.cos(_AROUND_SUN))
 
     @property
-    def areas(self) -> Real:
-        """Solid angles of the picture's texels, (rows, 1)."""
-        edges = np.cos(np.linspace(0.0, np.pi, len(self.picture) + 1))
-        return np.asarray(-np.diff(edges)[:, None] * 2.0 * np.pi / self.picture.shape[1])
-
-    def draw(self, start: int, count: int) -> tuple[Real, Real]:
-        """Draw directions (count, 3) in proportion to the radiance, with densities (count,).
-
-        The samples are stratified along a curve through all texels (Morton 1966), so that they
-        follow the brightness of each part of the sky.
-
-        start : number of the first sample in a sequence.
-        """
-        rows, columns, _ = self.picture.shape
-        row, column = np.indices((rows, columns)).reshape(2, -1)
-        # interleaved bits: neighbours in this order are neighbours in the sky
-        bits = [(bit, 2 * bit) for bit in range(10)]
-        curve = sum((row >> a & 1) << b | (column >> a & 1) << (b + 1) for a, b in bits)
-        order = np.argsort(curve)
-        below = np.cumsum((self.picture.sum(axis=2) * self.areas).ravel()[order])
-        inside, across, down = ((0.5 + np.outer(np.arange(start, start + count), _PLASTIC)) % 1.0).T
-        places = (np.arange(count) + inside) / count * below[-1]
-        texel = order[np.minimum(np.searchsorted(below, places), len(order) - 1)]
-        probability = np.diff(below, prepend=0.0)[np.argsort(order)][texel] / below[-1]
-        edges = np.cos(np.linspace(0.0, np.pi, rows + 1))
-        cosine = edges[row[texel]] + down * np.diff(edges)[row[texel]]
-        phi = 2.0 * np.pi * (column[texel] + across) / columns
-        return _directions(np.arccos(cosine), phi), probability / self.areas[row[texel], 0]
-
-    @property
     def total(self) -> float:
         """Radiance of all channels over the whole sphere."""
-        return float((self.picture.sum(axis=2) * self.areas).sum())
+        rows, columns, _ = self.picture.shape
+        bands = -np.diff(np.cos(np.linspace(0.0, np.pi, rows + 1))) * 2.0 * np.pi / columns
+        return float(bands @ self.picture.sum(axis=(1, 2)))
 
     def density(self, directions: Real) -> Real:
         """Return the probability density (n,) of drawn unit vectors (n, 3) per solid angle.

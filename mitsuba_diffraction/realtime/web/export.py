@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import base64
-import functools
 import html
 import json
 import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
 from ...progress import Progress, silent
-from ..glsl.methods import WEB_METHODS, refusal
+from ..glsl.methods import WEB_METHODS, check_methods, refusal
 from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene
@@ -35,7 +33,7 @@ from ..glsl.source import (
 from .light import packed_light, packed_surroundings
 from .material_choices import INDEXED, changeable, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
-from .tables import WebTable, fitting_tables, strongest_orders
+from .tables import DIGITS, strongest_orders, web_table
 
 #: Largest size of a page, bytes.
 MAX_BYTES = 25_000_000
@@ -96,11 +94,7 @@ def make_page(
     bounces : add light between surfaces, which takes seconds to trace.
     progress : called as progress(done, total, text).
     """
-    unknown = [method for method in methods if method not in WEB_METHODS]
-    if unknown or not methods or len(set(methods)) < len(methods):
-        raise DiffractionError(
-            f"methods={list(methods)!r}: choose from {', '.join(WEB_METHODS)}, each at most once"
-        )
+    check_methods(methods, WEB_METHODS)
     check_choice("view", view, VIEWS)
     if title is None:
         is_file = isinstance(scene, str | os.PathLike)
@@ -148,21 +142,45 @@ class Viewer:
 
 def _filled(header: dict[str, Any], data: bytes) -> str:
     """Fill the template of the page."""
+
+    def file(name: str) -> str:
+        """Read a file of the page."""
+        return shader_file(f"page/{name}", __package__)
+
     # "</script" would end the element of the header, and "<!--<script" its end
     text = json.dumps(header, ensure_ascii=False).replace("<", "\\u003c")
     parts = {
-        "style": _asset("style.css"),
-        "script": "\n".join(_asset(name) for name in _SCRIPTS),
+        "style": file("style.css"),
+        "script": "\n".join(map(file, _SCRIPTS)),
         "header": text,
         "data": base64.b64encode(data).decode(),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], _asset("page.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], file("page.html"))
 
 
-@functools.cache
-def _asset(name: str) -> str:
-    """Read a file of the page."""
-    return resources.files(__package__).joinpath("page", name).read_text(encoding="utf-8")
+@dataclass(frozen=True)
+class _Tables:
+    """Rounded tables of all surfaces for one method.
+
+    Attributes
+    ----------
+    parts, definitions : sections and definitions of each table.
+    loss : largest mean and largest 99th percentile of the ΔE2000 from the exact tables.
+    """
+
+    parts: list[dict[str, Any]]
+    definitions: list[Mapping[str, str]]
+    loss: tuple[float, float]
+
+    @classmethod
+    def rounded(
+        cls, method: str, surfaces: Sequence[Diffracting], digits: int, sections: Sections
+    ) -> _Tables:
+        """Round and store tables."""
+        packed, losses = zip(*(web_table(method, one, digits) for one in surfaces), strict=True)
+        mean, most = map(max, zip(*losses, strict=True))
+        parts = [packed_parts(each, sections) for each in packed]
+        return cls(parts, [each.definitions for each in packed], (mean, most))
 
 
 class _Writer:
@@ -195,11 +213,10 @@ class _Writer:
 
         The last methods are left out if their tables exceed the size of the page.
         """
-        room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - self._sections.nbytes
-        shown, tables, left_out = _fitted(methods, self._packed.diffracting, room, progress)
+        fitted, left_out = self._fitted(methods, progress)
         header = {
             "title": title,
-            "methods": shown,
+            "methods": list(fitted),
             "left_out": left_out,
             "omissions": _omissions(self._packed),
             "light": self._light,
@@ -208,47 +225,67 @@ class _Writer:
             # ends of the slider of height scales, and pages of energy scales
             "octaves": (OCTAVES[0], OCTAVES[-1]),
             "energy_pages": len(OCTAVES),
-            **self._tables(shown, tables),
-            **self._shaded(shown, tables),
+            **self._tables(fitted),
+            **self._shaded(fitted),
             **_shaders(view),
             **_framed(self._packed.scene),
         }
         data, header["sections"] = self._sections.joined()
         return header, data
 
-    def _tables(
-        self, shown: Sequence[str], tables: Mapping[str, Sequence[WebTable]]
-    ) -> dict[str, Any]:
+    def _fitted(
+        self, methods: Sequence[str], progress: Progress
+    ) -> tuple[dict[str, _Tables], dict[str, str]]:
+        """Round the tables of all methods to as many digits as fit into the page, and store them.
+
+        Returns the tables of each method that is shown, and why others are left out.
+        """
+        diffracting, others = self._packed.diffracting, self._sections
+        left_out = {
+            method: refusals[0]
+            for method in methods
+            if (refusals := [r for s in diffracting if (r := refusal(method, s.described))])
+        }
+        shown = [method for method in methods if method not in left_out]
+        while shown:
+            for digits in DIGITS:
+                progress(0, 0, f"rounding tables to {digits} digits")
+                self._sections = others.copy()
+                fitted = {m: _Tables.rounded(m, diffracting, digits, self._sections) for m in shown}
+                excess = self._sections.nbytes - (MAX_BYTES - CODE_BYTES) // 4 * 3
+                if excess <= 0:
+                    return fitted, left_out
+            left_out[shown.pop()] = (
+                f"{excess / 1e6:.1f} MB too large for a page of {MAX_BYTES / 1e6:.0f} MB"
+            )
+        reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
+        raise DiffractionError(
+            f"the scene is too large for a page ({reasons}); use fewer triangles, a smaller "
+            "coherence_width, or a shallower surface"
+        )
+
+    def _tables(self, fitted: Mapping[str, _Tables]) -> dict[str, Any]:
         """Return sections of each table and its loss by method; brightest orders of each table."""
         return {
-            "tables": {
-                method: [packed_parts(t.packed, self._sections, t.sections) for t in tables[method]]
-                for method in shown
-            },
-            # largest mean and largest 99th percentile
-            "loss": {
-                method: tuple(map(max, zip(*(table.loss for table in tables[method]), strict=True)))
-                for method in shown
-            },
+            "tables": {method: tables.parts for method, tables in fitted.items()},
+            "loss": {method: tables.loss for method, tables in fitted.items()},
             "orders": [strongest_orders(table.described) for table in self._packed.diffracting],
         }
 
-    def _shaded(
-        self, shown: Sequence[str], tables: Mapping[str, Sequence[WebTable]]
-    ) -> dict[str, Any]:
+    def _shaded(self, fitted: Mapping[str, _Tables]) -> dict[str, Any]:
         """Return the surfaces, and the section of all distinct sources of their shaders."""
         surfaces = []
         for surface, stored in zip(self._packed.surfaces, self._surfaces, strict=True):
-            definitions = {m: self._definitions(surface, tables[m]) for m in shown}
+            definitions = {
+                method: dict(surface.packed.definitions)
+                if surface.table is None
+                else {**surface.packed.definitions, **tables.definitions[surface.table]}
+                for method, tables in fitted.items()
+            }
             surfaces.append({**stored, **self._surface(surface, definitions)})
         joined = json.dumps(self._sources).encode()
         programs = packed_array(np.frombuffer(joined, np.uint8)[:, None])
         return {"surfaces": surfaces, "programs": self._sections.add(programs)}
-
-    def _definitions(self, surface: PackedSurface, tables: Sequence[WebTable]) -> dict[str, str]:
-        """Return the definitions of a surface with its table of a method."""
-        table = {} if surface.table is None else tables[surface.table].packed.definitions
-        return {**surface.packed.definitions, **table}
 
     def _surface(
         self, surface: PackedSurface, definitions: Mapping[str, dict[str, str]]
@@ -264,6 +301,7 @@ class _Writer:
         return {
             "name": surface.scene.name,
             "emits": surface.scene.radiance is not None,
+            "lamp": surface.scene.lamp,
             "height_scale": None if described is None else described.height_scale.number,
             "table": surface.table or 0,
             "programs": {m: self._program(m, d) for m, d in definitions.items()},
@@ -318,30 +356,6 @@ def _framed(scene: RealtimeScene) -> dict[str, Any]:
         "subject": [x.tolist() for x in scene.subject],
         "background": _zenith(scene.lighting.sky),
     }
-
-
-def _fitted(
-    methods: Sequence[str], tables: Sequence[Diffracting], room: int, progress: Progress
-) -> tuple[list[str], dict[str, list[WebTable]], dict[str, str]]:
-    """Return the methods whose tables fit, their tables, and why others are left out."""
-    shown, left_out = list(methods), {}
-    for method in methods:
-        refusals = (refusal(method, surface.described) for surface in tables)
-        if reason := next(filter(None, refusals), None):
-            shown.remove(method)
-            left_out[method] = reason
-    while shown:
-        rounded = fitting_tables(shown, tables, room, progress)
-        if not isinstance(rounded, int):
-            return shown, rounded, left_out
-        left_out[shown.pop()] = (
-            f"{(rounded - room) / 1e6:.1f} MB too large for a page of {MAX_BYTES / 1e6:.0f} MB"
-        )
-    reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
-    raise DiffractionError(
-        f"the scene is too large for a page ({reasons}); use fewer triangles, a smaller "
-        "coherence_width, or a shallower surface"
-    )
 
 
 def _source(method: str, definitions: dict[str, str]) -> str:

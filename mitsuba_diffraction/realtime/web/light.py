@@ -1,6 +1,6 @@
 """Light of a page: lights, a sequence that represents all emitters, and the surroundings.
 
-The surroundings are an environment, shapes that emit light, and data to look them up along lobes.
+The surroundings are an environment, and data to look light up along lobes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..glsl.packed_scene import PackedScene
 from ..glsl.packing import WAVENUMBERS, pack_responses
 from ..glsl.source import plain_source
 from ..glsl.texels import shortened
-from .sections import Sections, converted, packed_array, packed_mesh, packed_parts
+from .sections import Sections, converted, packed_array, packed_parts
 
 #: Number of lights in the sequence; their mean is the scene's light.
 SAMPLES = 256
@@ -99,8 +99,7 @@ def packed_surroundings(
         return None, {}
     parts = packed.around | converted(packed.obstacles, {"obstacles": _coarser})
     if bounces:
-        # path-traced means of few paths have noise of more than the ninth digit
-        parts |= converted(packed.bounces, {"bounces": _eight_digits})
+        parts |= packed.bounces
     # rounding adds no bias: shaders divide by the rounded densities
     digits: dict[str, Any] = {"lobe_places": np.float16, "lobe_densities": shortened}
     lobes = [converted(part, digits) for part in packed.lobes]
@@ -112,18 +111,8 @@ def packed_surroundings(
         "bounces": bounces,
         "parts": packed_parts(parts, sections),
         "lobes": [packed_parts(part, sections) for part in lobes],
-        "emitting": [
-            {"mesh": packed_mesh(glow.vertices, sections), "radiance": glow.radiance.tolist()}
-            for glow in packed.scene.emitting
-        ],
-        "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
     }, {name: text for part in (parts, *lobes) for name, text in part.definitions.items()}
-
-
-def _eight_digits(values: NDArray[Any]) -> NDArray[np.float16]:
-    """Round half floats, which have eleven binary digits, to eight."""
-    return shortened(values).astype(np.float16)
 
 
 def _coarser(obstacles: NDArray[Any]) -> NDArray[np.uint8]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import itertools
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,9 +24,7 @@ _LEVEL = 9
 _ROWS = (1, 2, 3, 4, 6, 8, 12)  # rows that may stand in one
 _SAMPLED = 1 << 22  # bytes that the layout is chosen by
 
-_UNIT = 8191  # integer that encodes a coordinate 1 of directions
 _STEPS = 65535  # integer that encodes the far side of a bounding box
-_NO_DIRECTION = -8192  # integer that encodes a direction of length 0
 
 
 @dataclass(frozen=True)
@@ -78,8 +76,12 @@ def as_columns(data: Any, width: int) -> Any:
 class Sections:
     """Data of the page, a sequence of sections."""
 
-    def __init__(self) -> None:
-        self._parts: list[Section] = []
+    def __init__(self, parts: Iterable[Section] = ()) -> None:
+        self._parts = list(parts)
+
+    def copy(self) -> Sections:
+        """Return a sequence that begins with these sections."""
+        return Sections(self._parts)
 
     def add(self, section: Section) -> int:
         """Append a section unless it exists, and return its number."""
@@ -111,22 +113,18 @@ def packed_mesh(vertices: NDArray[np.float32], sections: Sections) -> dict[str, 
 
     columns : (vertices, n) sixteen-bit attributes of every distinct vertex.
     corners : (3 · triangles, 1) indices of vertices.
-    tangents : (triangles, 2), if each triangle has one; otherwise they are in `columns`.
+    tangents : (triangles, 3), if each triangle has one; otherwise they are in `columns`.
     width : number of columns.
-    layout : columns of each attribute; a constant attribute has its value instead.
+    layout : columns of each attribute, lowest values and steps; a constant attribute has its value
+        instead.
     """
     names, sizes = zip(*VERTEX, strict=True)
     parts = dict(zip(names, np.split(vertices, np.cumsum(sizes)[:-1], axis=1), strict=True))
-    tangents = octahedral(parts.pop("tangent"))
-    by_triangle = tangents.reshape(-1, 3, 2)
-    flat = bool(np.all(by_triangle == by_triangle[:, :1]))
-    columns = [octahedral(parts.pop("normal")).view(np.uint16)]
-    layout: dict[str, Any] = {"normal": {"column": 0}}
-    width = 2
-    if not flat:
-        columns.append(tangents.view(np.uint16))
-        layout["tangent"] = {"column": width}
-        width += 2
+    for name in ("normal", "tangent"):
+        length = np.linalg.norm(parts[name], axis=1, keepdims=True)
+        parts[name] = parts[name] / np.maximum(length, 1e-20)
+    columns, layout, width = [], dict[str, Any](), 0
+    arrays: dict[str, Any] = {}
     for name, values in parts.items():
         low = values.min(axis=0).astype(np.float64)
         extent = values.max(axis=0) - low
@@ -134,32 +132,19 @@ def packed_mesh(vertices: NDArray[np.float32], sections: Sections) -> dict[str, 
             layout[name] = {"value": low.tolist()}
             continue
         steps = extent / _STEPS
-        whole = (values - low) / np.where(steps > 0.0, steps, 1.0)
-        columns.append(np.round(whole).astype(np.uint16))
-        layout[name] = {"column": width, "low": low.tolist(), "step": steps.tolist()}
+        whole = np.round((values - low) / np.where(steps > 0.0, steps, 1.0)).astype(np.uint16)
+        layout[name] = {"low": low.tolist(), "step": steps.tolist()}
+        by_triangle = whole.reshape(-1, 3, values.shape[1])
+        if name == "tangent" and np.all(by_triangle == by_triangle[:, :1]):
+            arrays["tangents"] = by_triangle[:, 0]
+            continue
+        layout[name]["column"] = width
+        columns.append(whole)
         width += values.shape[1]
-    distinct, corners = distinct_rows(np.concatenate(columns, axis=1))
-    arrays: dict[str, Any] = {"columns": distinct, "corners": corners[:, None]}
-    if flat:
-        arrays["tangents"] = by_triangle[:, 0]
+    arrays["columns"], corners = distinct_rows(np.concatenate(columns, axis=1))
+    arrays["corners"] = corners[:, None]
     stored = {n: sections.add(packed_array(a)) for n, a in arrays.items()}
     return {"tangents": None, **stored, "width": width, "layout": layout}
-
-
-def octahedral(directions: NDArray[np.floating]) -> NDArray[np.int16]:
-    """Encode directions (n, 3) of any length as two integers (Cigolle et al. 2014).
-
-    The error is at most 2.8e-4 rad. Both integers of a vector of length 0 are -8192.
-    """
-    d = np.asarray(directions, np.float64)
-    length = np.abs(d).sum(axis=1, keepdims=True)
-    nonzero = length[:, 0] > 1e-20
-    d = d / np.where(length > 1e-20, length, 1.0)
-    folded = (1.0 - np.abs(d[:, 1::-1])) * np.where(d[:, :2] < 0.0, -1.0, 1.0)
-    plane = np.where(d[:, 2:] < 0.0, folded, d[:, :2])
-    result = np.round(plane * _UNIT).astype(np.int16)
-    result[~nonzero] = _NO_DIRECTION
-    return result
 
 
 def converted(packed: Packed, functions: Mapping[str, Callable[[Any], Any]]) -> Packed:
@@ -169,19 +154,16 @@ def converted(packed: Packed, functions: Mapping[str, Callable[[Any], Any]]) -> 
     return replace(packed, textures=tuple(textures))
 
 
-def packed_parts(
-    packed: Packed, sections: Sections, compressed: Mapping[str, Section] | None = None
-) -> dict[str, Any]:
-    """Return textures and uniforms as JSON types; `compressed` has sections of some textures."""
-    ready = compressed or {}
+def packed_parts(packed: Packed, sections: Sections) -> dict[str, Any]:
+    """Return textures and uniforms as JSON types."""
     return {
         "uniforms": {name: plain(value) for name, value in packed.uniforms.items()},
-        "textures": [_texture(t, sections, ready.get(t.name)) for t in packed.textures],
+        "textures": [_texture(texture, sections) for texture in packed.textures],
     }
 
 
-def _texture(texture: Texture, sections: Sections, section: Section | None) -> dict[str, Any]:
-    """Return a texture as JSON types, and store its data, if not yet compressed, as a section."""
+def _texture(texture: Texture, sections: Sections) -> dict[str, Any]:
+    """Return a texture as JSON types, and store its data as a section."""
     rows, columns, channels = texture.data.shape
     entry: dict[str, Any] = {
         "name": texture.name, "width": columns, "height": rows, "channels": channels,
@@ -192,8 +174,7 @@ def _texture(texture: Texture, sections: Sections, section: Section | None) -> d
         return entry | {"kind": "picture", "section": sections.add(picture)}
     data = texture.data
     entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
-    section = section or packed_array(data.reshape(-1, channels))
-    return entry | {"section": sections.add(section)}
+    return entry | {"section": sections.add(packed_array(data.reshape(-1, channels)))}
 
 
 def _picture(data: NDArray[np.generic]) -> bytes:

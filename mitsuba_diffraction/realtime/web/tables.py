@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,6 @@ from ...orders import OrderTable, cells
 from ...orders.cells import Counts
 from ...orders.rows import kinds_of, middles, rows, wavelength_of
 from ...plugin.description import Surface
-from ...progress import Progress
 from ...tables import DiffractionTable
 from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
 from ...tables.powers import power_series, powers_at
@@ -22,38 +20,26 @@ from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import cells_within, pack_orders
 from ..glsl.texels import Packed, shortened
-from .sections import Section, as_columns, converted, packed_array
+from .sections import as_columns, converted
 
-#: Binary digits of a series' largest number; the mean ΔE2000 stays below 0.1.
-DIGITS = 9
+#: Binary digits of a series' largest number, fewer where tables are too large for a page; of the
+#: most, the mean ΔE2000 stays below 0.1.
+DIGITS = (9, 8, 7, 6)
 #: Smallest rounding step relative to a table's largest number: more digits are not visible.
 FLOOR = 2.0**-17
-
-_FEWER = 4  # numbers of digits that are tried for tables that are too large for a page
 
 _ORDERS = 5  # largest number of orders that the page names
 _ORDER_BYTES = 6 << 20  # size of efficiencies of solved orders before compression
 _BANDS = 4  # bands of solved orders whose colours are compared
 
 
-@dataclass(frozen=True)
-class WebTable:
-    """Rounded table for one method."""
-
-    packed: Packed  # textures, uniforms and definitions for the shader
-    sections: dict[str, Section]  # compressed textures, by name
-    loss: tuple[float, float]  # mean and 99th percentile of ΔE2000 from the exact table
-
-    @property
-    def nbytes(self) -> int:
-        """Size of all sections."""
-        return sum(len(section.data) for section in self.sections.values())
-
-
-def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
+def web_table(method: str, surface: Diffracting, digits: int) -> tuple[Packed, tuple[float, float]]:
     """Round a table to fewer binary digits for one of `WEB_METHODS`.
 
     `exact` does not support coherent tables.
+
+    Returns textures, uniforms and definitions, and the mean and 99th percentile of ΔE2000 from the
+    exact table.
     """
     orders = surface.described.orders
     packed, loss = (
@@ -61,8 +47,7 @@ def web_table(method: str, surface: Diffracting, digits: int) -> WebTable:
         if orders is None
         else _solved(method, orders, surface.described.sigma, digits)
     )
-    sections = {x.name: packed_array(x.data.reshape(-1, x.data.shape[2])) for x in packed.textures}
-    return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
+    return packed, (float(loss.mean()), float(np.percentile(loss, 99.0)))
 
 
 #: Table in fewer digits: textures, uniforms and definitions; ΔE2000 (n,) from the exact table.
@@ -75,7 +60,7 @@ def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
         colours = cached_colours(table)
         # rounded twice, so that the upper halves of floats, which the shader reads, are exact
         coefficients = shortened(rounded(colours.coefficients, digits, FLOOR)).astype(np.float16)
-        fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
+        fewer = replace(colours, coefficients=coefficients)
         return pack_colours(fewer), colour_difference(colours, fewer)
     series, order_0, scale, expansion = power_series(table)
     powers = replace(
@@ -129,23 +114,6 @@ def rounded(values: NDArray[np.floating], bits: int, floor: float = 0.0) -> NDAr
     powers = np.exp2(np.ceil(np.log2(largest)))
     step = np.maximum(powers * 2.0**-bits, powers.max() * floor)
     return (np.round(exact / step) * step).astype(np.float16)
-
-
-def fitting_tables(
-    methods: Sequence[str], tables: Sequence[Diffracting], room: int, progress: Progress
-) -> dict[str, list[WebTable]] | int:
-    """Round tables for all methods to `DIGITS`, or to fewer if they exceed `room` bytes.
-
-    Returns the tables by method, or the number of bytes that is needed if none fit.
-    """
-    needed = 0
-    for digits in range(DIGITS, DIGITS - _FEWER, -1):
-        progress(0, 0, f"rounding tables to {digits} digits")
-        fitting = {m: [web_table(m, table, digits) for table in tables] for m in methods}
-        needed = sum(table.nbytes for rounded in fitting.values() for table in rounded)
-        if needed <= room:
-            return fitting
-    return needed
 
 
 def strongest_orders(described: Surface) -> list[list[float]]:

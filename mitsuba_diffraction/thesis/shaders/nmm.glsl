@@ -21,6 +21,6 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
         float power = window_power(uv, z, white_wavelength) / (white_wavelength * white_wavelength);
         return light_colour[light] * reflectance(cos_half) * power;
     }
-    return reflectance_at_all(cos_half) * (reached(uv.x, periods.x, uv, z, cos_half, light)
-                                           + reached(uv.y, periods.y, uv, z, cos_half, light));
+    return reached(uv.x, periods.x, uv, z, cos_half, light)
+         + reached(uv.y, periods.y, uv, z, cos_half, light);
 }

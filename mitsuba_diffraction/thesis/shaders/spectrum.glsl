@@ -14,5 +14,5 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
         before = next - wavelength;
         sum += weight * of_wavelength(uv, z, cos_half, wavelength, light);
     }
-    return reflectance_at_all(cos_half) * sum;
+    return sum;
 }

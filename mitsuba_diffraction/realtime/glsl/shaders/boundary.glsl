@@ -28,25 +28,20 @@ vec3 flat_reflectance(float cosine) { return reflectance(cosine); }
 void begin_pair(vec3 wi, vec3 wo, vec2 outer) {}
 
 vec3 boundary(float cos_half, float r, float z) { return reflectance(cos_half); }
-float boundary_at_all(float cos_half) { return reflectance_at_all(cos_half); }
 float boundary_at(float cos_half, float k, float r, float z) { return reflectance_at(cos_half, k); }
 
 #else
 
 #ifdef STATISTIC
 
-uniform sampler2D statistic;      // of the heights, µm², at a node in log2 q and at the next one
+uniform sampler2D statistic;      // of the heights, µm², over log2 q
 uniform float first_octave;       // log2 q of the first node
-uniform float last_node;
 
 // The model's statistic of the heights at the frequency q of an order, σ_q² of small slope.
 float height_statistic(float q)
 {
     float place = (log2(max(q, 1e-10)) - first_octave) * NODES_PER_OCTAVE;
-    place = clamp(place, 0.0, last_node);
-    float lower = min(floor(place), last_node - 1.0);
-    vec2 ends = entry(statistic, int(lower)).xy;
-    return mix(ends.x, ends.y, place - lower);
+    return in_row(statistic, place / float(textureSize(statistic, 0).x - 1), 0).x;
 }
 
 #else
@@ -69,8 +64,6 @@ void begin_pair(vec3 wi, vec3 wo, vec2 outer)
     begin_boundary(wi, wo);
 #endif
 }
-
-float boundary_at_all(float cos_half) { return 1.0; }
 
 #if SURFACE_KIND == DIELECTRIC
 

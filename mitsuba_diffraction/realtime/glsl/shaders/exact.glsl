@@ -154,7 +154,7 @@ float reflected_at(vec2 uv, float r, float z, float k, float cos_half)
 #ifdef ORDER_0
     float sigma_0 = sigma * sqrt(order_0_ratio);
     float lobe = order_0_ratio * exp(-order_0_ratio * apart * apart);
-    reflected += lobe * specular * mirror_at(cos_half, k, sigma_0);
+    reflected += lobe * specular * mirror_at(k, sigma_0);
 #ifdef COATED
     reflected += lobe * face_at(k, sigma_0);
 #endif
@@ -182,8 +182,7 @@ uniform float wavenumber;        // wavenumber of monochromatic light, rad/µm
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float k = wavenumber / (2.0 * PI);
-    return light_colour[light] * boundary_at_all(cos_half) * k * k
-        * reflected_at(uv, length(uv), z, wavenumber, cos_half);
+    return light_colour[light] * k * k * reflected_at(uv, length(uv), z, wavenumber, cos_half);
 }
 
 #else
@@ -192,10 +191,8 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float r = length(uv);
-    vec3 sum;
-    if (r * sigma * WIDEST_LOBE > sqrt(0.5)) sum = from_order_to_order(uv, r, z, cos_half, light);
-    else sum = from_wavelength_to_wavelength(uv, r, z, cos_half, light);
-    return boundary_at_all(cos_half) * sum;
+    if (r * sigma * WIDEST_LOBE > sqrt(0.5)) return from_order_to_order(uv, r, z, cos_half, light);
+    return from_wavelength_to_wavelength(uv, r, z, cos_half, light);
 }
 
 #endif

@@ -3,7 +3,7 @@
 
 uniform sampler2D colours;      // two texels per bin: term t of channel c is number 5c + t
 uniform sampler2D rings;        // first bin of a ring; azimuths of the ring and the next one
-uniform sampler2D glossy;       // order 0, radii × zs: colours of this z and the next
+uniform sampler2D glossy;       // order 0: columns over z, rows over the radius
 uniform int bins;               // number of bins in one interval of z
 uniform int last_ring;
 uniform float smallest_radius;
@@ -11,8 +11,8 @@ uniform float ring_step;        // step in ln r
 uniform float interval_length;
 uniform int intervals;
 uniform float inverse_scale;
-uniform vec2 glossy_steps;      // 1/µm… of radius and z: entries per unit
-uniform ivec2 glossy_size;      // radii, zs
+uniform vec2 glossy_ends;       // z and radius of the last entries
+uniform float glossy_scale;     // colour of 1
 uniform float sigma_0;          // of order 0's window, µm
 
 void add_bin(int bin, float weight, inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
@@ -77,25 +77,13 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     return sum * (fade * inverse_scale);
 }
 
-// Interpolate order 0 between an entry and that of the next z.
-vec3 glossy_between(int index, float t)
-{
-    vec4 pair = entry(glossy, index);
-    vec2 middle = upper_halves(pair.y);
-    return mix(vec3(upper_halves(pair.x), middle.x), vec3(middle.y, upper_halves(pair.z)), t);
-}
-
-// Order 0, whose lobe is about a degree wide.
+// Order 0, whose lobe is about a degree wide; the last radius is dark.
 vec3 order_0(float radius, float z)
 {
-    vec2 last = vec2(glossy_size) - 1.0;
-    vec2 position = vec2(radius, z) * glossy_steps;
-    vec2 lower = floor(min(position, last - 1.0));
-    vec2 t = clamp(position - lower, 0.0, 1.0);
-    int index = int(lower.x) * glossy_size.y + int(lower.y);
-    vec3 inner = glossy_between(index, t.y);
-    vec3 outer = glossy_between(index + glossy_size.y, t.y);
-    return mix(inner, outer, t.x);  // the last radius is dark
+    float last = float(textureSize(glossy, 0).y - 1), place = min(radius / glossy_ends.y, 1.0) * last;
+    float lower = min(floor(place), last - 1.0), share = z / glossy_ends.x;
+    vec4 inner = in_row(glossy, share, int(lower)), outer = in_row(glossy, share, int(lower) + 1);
+    return glossy_scale * mix(inner.rgb, outer.rgb, place - lower);
 }
 
 #ifdef COHERENT

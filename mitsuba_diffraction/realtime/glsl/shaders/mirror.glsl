@@ -39,19 +39,22 @@ vec3 face(float sigma_0)
 
 #endif
 
-#if SURFACE_KIND == CONDUCTOR
-
-// Factor of order 0 at one wavenumber, to be multiplied by `boundary_at_all`.
-float mirror_at(float cos_half, float k, float sigma_0)
+// Factor of order 0 at one wavenumber.
+float mirror_at(float k, float sigma_0)
 {
-#ifdef COATED
+    float cosine = mirrored(k, sigma_0);
+#if defined(COATED) && SURFACE_KIND == CONDUCTOR
     vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
-    float reflected = beneath_reflectance(mirrored(k, sigma_0), coat, index);
+    float reflected = beneath_reflectance(cosine, coat, index);
+#elif defined(COATED)
+    float reflected = beneath_reflectance(cosine, coat, eta);
 #else
-    float reflected = reflectance_at(mirrored(k, sigma_0), k);
+    float reflected = reflectance_at(cosine, k);
 #endif
     return mirror_share * visible(k, sigma_0) * reflected;
 }
+
+#if SURFACE_KIND == CONDUCTOR
 
 // Factor of order 0 in each channel.
 vec3 mirror(float cos_half, float sigma_0)
@@ -76,25 +79,11 @@ vec3 mirror(float cos_half, float sigma_0)
 
 #else
 
-float mirror_at(float cos_half, float k, float sigma_0)
-{
-    float share = mirror_share * visible(k, sigma_0);
-#if defined(COATED)
-    return share * beneath_reflectance(mirrored(k, sigma_0), coat, eta);
-#elif SURFACE_KIND == PERFECT
-    return share;
-#elif defined(BOUNDARY)
-    return share * reflectance_at_all(mirrored(k, sigma_0));
-#else
-    return share * reflectance_at_all(mirrored(k, sigma_0)) / max(reflectance_at_all(cos_half), 1e-20);
-#endif
-}
-
 vec3 mirror(float cos_half, float sigma_0)
 {
     vec3 found;
-    for (int n = 0; n < 3; ++n) found[n] = mirror_at(cos_half, channel_wavenumbers[n], sigma_0);
-    return found * boundary_at_all(cos_half);
+    for (int n = 0; n < 3; ++n) found[n] = mirror_at(channel_wavenumbers[n], sigma_0);
+    return found;
 }
 
 #endif

@@ -23,8 +23,8 @@ uniform sampler2D normal_map;
 uniform mat3 normal_uv;
 uniform vec3 emission;            // radiance, on the side that the normal points to
 uniform mat3 pigment_in_light;    // from a pigment's colour to its colour under this light
-uniform float light_density;      // `lights.Light.density`
-uniform bool solid;               // closed surface, seen from outside: rays inwards are blocked
+uniform float light_density;      // `lights.Lamp.density`
+uniform vec2 surroundings_lit;    // factors on the environment and on area lights: 1, or 0 if off
 
 out vec4 fragment;
 
@@ -164,8 +164,7 @@ void main()
 #ifdef LOBES
     vec3 wo = lobe_direction(wi, rotation, drawn_numbers());
     vec3 direction = wo.x * s + wo.y * t + side * wo.z * n;
-    if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0
-        && !(solid && dot(direction, flat_normal) <= 0.0)) {
+    if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0) {
         float distance;
         vec4 light = arriving(v_position, direction, distance);
         float density = lobe_density(wi, wo, rotation);
@@ -191,9 +190,6 @@ void main()
             radiance += light.rgb * lobes(wi, wo, rotation, 0)
                 * (kept_by_facet(n, smooth_normal, direction) / (density + light.w));
     }
-#endif
-#ifdef EMITTING
-    if (dot(v_normal, towards_eye) > 0.0) radiance += surroundings_lit.y * emission;
 #endif
 #else
     for (int i = 0; i < LIGHTS_LIT; ++i) {
@@ -222,7 +218,6 @@ void main()
         if (light_place[i].w > 0.0) falloff /= square;
 #ifdef SHADOWED
         if (i == 0) falloff *= emitted(direction) * reached(v_position, flat_normal);
-        if (solid && dot(flat_normal, direction) <= 0.0) lit = false;
 #endif
         radiance += lit ? falloff * added : vec3(0.0);
     }
@@ -235,6 +230,9 @@ void main()
 #endif
     radiance += seen ? max(above, 0.0) * returned : vec3(0.0);
 #endif
+#endif
+#if defined(EMITTING) && !defined(WEIGHTED)
+    if (dot(v_normal, towards_eye) > 0.0) radiance += surroundings_lit.y * emission;
 #endif
     fragment = vec4(radiance, 1.0);
 }

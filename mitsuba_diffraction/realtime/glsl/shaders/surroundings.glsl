@@ -3,7 +3,6 @@
 
 uniform vec2 sequence;            // numbers of the frame, from 0 to 1
 uniform float least_distance;     // least distance from a plane: a surface does not see itself
-uniform vec2 surroundings_lit;    // factors on the environment and on area lights: 1, or 0 if off
 uniform vec4 dome;                // direction upwards, and radiance from above of a page's own light
 
 #ifdef ENVIRONMENT

@@ -191,7 +191,7 @@ class Drawing {
   }
 
   async loadMeshes() {
-    for (const { mesh } of [...this.surfaces, ...(this.around?.glowing ?? [])]) await mesh.load(this.data);
+    for (const { mesh } of this.surfaces) await mesh.load(this.data);
     for (const map of Object.values(this.shadows)) map.key = undefined; // those of the stand-ins
   }
 
@@ -271,6 +271,7 @@ class Drawing {
     const [first, last] = this.header.octaves;
     const page = ((octaves - first) / (last - first)) * (this.header.energy_pages - 1);
     this.surfaces.forEach((surface, number) => {
+      if (surface.lamp && !view.around) return; // lamps belong to the scene's light
       const program = this.dressed(surface, view, main);
       program.texture("shadow_map", this.shadows[view.moving ? "coarse" : "fine"].texture);
       if (view.looksUp) this.around.use(program, surface.table);
@@ -296,7 +297,7 @@ class Drawing {
     gl.enable(gl.DEPTH_TEST);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    if (view.around) this.around.draw(view, this);
+    if (view.around && view.bright && this.around.background) this.around.draw(view, this);
     this.drawSurfaces(view, "surface");
     gl.disable(gl.SCISSOR_TEST);
   }

@@ -2,24 +2,6 @@
 
 const ATTRIBUTES = { position: 3, normal: 3, tangent: 3, texcoord: 2, colour: 3, axis: 3 };
 
-const UNIT = 8191, NO_DIRECTION = -8192; // see sections.py
-
-// Decode directions, four numbers each, from two integers in each row (Cigolle et al. 2014).
-function directions(rows, width, column) {
-  const found = new Int16Array((4 * rows.length) / width);
-  for (let from = column, at = 0; at < found.length; from += width, at += 4) {
-    if (rows[from] === NO_DIRECTION) continue;
-    let x = rows[from] / UNIT, y = rows[from + 1] / UNIT;
-    const z = 1 - Math.abs(x) - Math.abs(y);
-    if (z < 0) [x, y] = [(1 - Math.abs(y)) * (x < 0 ? -1 : 1), (1 - Math.abs(x)) * (y < 0 ? -1 : 1)];
-    const scale = 32767 / Math.sqrt(x * x + y * y + z * z);
-    found[at] = Math.round(x * scale);
-    found[at + 1] = Math.round(y * scale);
-    found[at + 2] = Math.round(z * scale);
-  }
-  return found;
-}
-
 // Triangles of a surface. Each level of detail is uploaded when it is drawn first: 0 is all, larger
 // numbers are fewer. Before `load` one triangle stands for all, in the same formats.
 class Mesh {
@@ -27,12 +9,11 @@ class Mesh {
     Object.assign(this, { gl, described });
     const { width, layout } = described, columns = new Uint16Array(3 * width);
     for (let n = 0; n < 3; ++n) columns[n * width + (layout.position.column ?? 0) + n] = 65535;
-    this.fill(new Uint32Array([0, 1, 2]), columns, new Int16Array(2));
+    this.fill(new Uint32Array([0, 1, 2]), columns, new Uint16Array(3));
   }
 
   fill(corners, columns, tangents) {
-    const signed = new Int16Array(columns.buffer, 0, columns.length);
-    Object.assign(this, { corners, columns, signed, tangents, decoded: {}, constants: [], lists: [null], levels: [] });
+    Object.assign(this, { corners, columns, tangents, constants: [], lists: [null], levels: [] });
   }
 
   async load(data) {
@@ -42,7 +23,7 @@ class Mesh {
 
   // Upload triangles by the numbers of their corners, null for all, with vertices of their own.
   uploaded(chosen) {
-    const { gl, corners, columns, tangents, decoded } = this, { width, layout } = this.described;
+    const { gl, corners, columns, tangents } = this, { width, layout } = this.described;
     const array = gl.createVertexArray(), { length } = chosen ?? corners;
     gl.bindVertexArray(array);
     Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
@@ -51,31 +32,18 @@ class Mesh {
         this.constants[location] = [...place.value, 0, 0].slice(0, 4);
         return;
       }
-      const direction = name === "normal" || name === "tangent";
-      // directions have a fourth number, which shaders ignore: drivers convert three short ones slowly
-      const stride = direction ? 4 : size;
-      const values = direction ? new Int16Array(length * stride) : new Float32Array(length * stride);
-      if (direction) {
-        const flat = name === "tangent" && this.described.tangents !== null;
-        const found = (decoded[name] ??= flat ? directions(tangents, 2, 0) : directions(this.signed, width, place.column));
-        for (let i = 0, to = 0; i < length; ++i) {
-          const corner = chosen ? chosen[i] : i, from = 4 * (flat ? (corner / 3) | 0 : corners[corner]);
-          values[to++] = found[from];
-          values[to++] = found[from + 1];
-          values[to++] = found[from + 2];
-          ++to;
-        }
-      } else {
-        const { low, step, column } = place;
-        for (let i = 0, to = 0; i < length; ++i) {
-          const from = corners[chosen ? chosen[i] : i] * width + column;
-          for (let c = 0; c < size; ++c) values[to++] = low[c] + step[c] * columns[from + c];
-        }
+      const { low, step, column } = place, values = new Float32Array(length * size);
+      const whole = column === undefined; // triangles have one each
+      const rows = whole ? tangents : columns;
+      for (let i = 0, to = 0; i < length; ++i) {
+        const corner = chosen ? chosen[i] : i;
+        const from = whole ? size * ((corner / 3) | 0) : corners[corner] * width + column;
+        for (let c = 0; c < size; ++c) values[to++] = low[c] + step[c] * rows[from + c];
       }
       gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
       gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
       gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, stride, direction ? gl.SHORT : gl.FLOAT, direction, 0, 0);
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 0, 0);
     });
     gl.bindVertexArray(null);
     return { array, length };

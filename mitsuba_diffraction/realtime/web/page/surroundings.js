@@ -1,5 +1,5 @@
-// Surroundings of the scene: environment, shapes that emit light, and look-ups along lobes, like
-// glsl/progressive.py and glsl/surroundings.py.
+// Surroundings of the scene: environment, and look-ups along lobes, like glsl/progressive.py and
+// glsl/surroundings.py.
 
 const WHITE = { place: [0, 0, 1, 0], colour: [1, 1, 1], axis: DARK, cone: [0, 0], spectrum: -1, density: 0 };
 // Numbers of each sample, like glsl/progressive.py.
@@ -7,12 +7,10 @@ const drawnNumbers = (n) => [0.5 + Math.sqrt(1.25), Math.sqrt(19)].map((step) =>
 
 class Surroundings {
   static async load(gl, header, data) {
-    const around = new Surroundings(), { parts, lobes, emitting, glow, background } = header.around;
+    const around = new Surroundings(), { parts, lobes, background } = header.around;
     around.gl = gl;
     around.part = await Part.load(gl, data, parts);
     around.lobes = await Promise.all(lobes.map((one) => Part.load(gl, data, one)));
-    around.glowing = emitting.map(({ mesh, radiance }) => ({ mesh: new Mesh(gl, mesh), radiance }));
-    around.glow = new Program(gl, header.vertex, glow);
     around.background = background && new Program(gl, header.shown.vertex, background);
     return around;
   }
@@ -23,24 +21,17 @@ class Surroundings {
     this.lobes[table]?.use(program);
   }
 
-  // Draw the environment in the background and shapes that emit light; unless bright, in black.
-  draw(view, drawing) {
-    const { gl } = this, { uniforms, matrix, up, bright, width, height } = view;
-    if (bright && this.background) {
-      gl.disable(gl.DEPTH_TEST);
-      this.background.use();
-      this.part.use(this.background);
-      this.background.set({
-        ...uniforms, from_clip: columnMajor(inverse(matrix)), picture_size: [width, height],
-        horizon: up, // a sky that is dark below is mirrored at the horizon
-      });
-      drawing.triangle();
-      gl.enable(gl.DEPTH_TEST);
-    }
-    this.glow.use();
-    for (const { mesh, radiance } of this.glowing) {
-      this.glow.set({ ...uniforms, radiance: bright ? radiance : DARK });
-      mesh.draw(view.detail);
-    }
+  // Draw the environment in the background.
+  draw({ uniforms, matrix, up, width, height }, drawing) {
+    const { gl } = this;
+    gl.disable(gl.DEPTH_TEST);
+    this.background.use();
+    this.part.use(this.background);
+    this.background.set({
+      ...uniforms, from_clip: columnMajor(inverse(matrix)), picture_size: [width, height],
+      horizon: up, // a sky that is dark below is mirrored at the horizon
+    });
+    drawing.triangle();
+    gl.enable(gl.DEPTH_TEST);
   }
 }

@@ -120,7 +120,7 @@ class Viewer {
     const height = Math.max(1, Math.round(drawing.height * share));
     // shapes that only emit light shade only directional lights
     const far = around && chosen[0]?.place[3] === 0;
-    const casters = far ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces.filter(({ emits }) => !emits);
+    const casters = drawing.surfaces.filter(({ emits, lamp }) => (far || !emits) && (around || !lamp));
     const shadow = this.shadows && chosen.length && !lookup ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], casters, detail, one ? this.count : 0) : UNSHADOWED;
     // draw moving pictures by the faster method
     const method = moving && this.drawn === this.method && drawing.tables.fast ? "fast" : this.drawn;
