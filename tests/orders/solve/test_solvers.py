@@ -7,12 +7,11 @@ import pytest
 
 from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.polarised import mueller_of
-from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
-from mitsuba_diffraction.orders.solve.stations import Grating, reversed_light
+from mitsuba_diffraction.orders.solve.stations import Grating
 from mitsuba_diffraction.reference.boundary import mueller, turn
 from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.reference.model import small_slope
@@ -79,18 +78,6 @@ def test_a_perfect_conductor_reflects_all_light_whatever_the_wavelength():
     assert np.allclose(near, far, atol=1e-12)
     # 1.1e-3 at 60 points
     assert np.allclose(near.sum(axis=(3, 4)), 1, atol=5e-4)
-
-
-@pytest.mark.parametrize(
-    ("solver", "size", "error"), [(IntegralSolver, 110, 5e-3), (Chandezon, 15, 1e-6)]
-)
-def test_reversed_light_has_the_same_amplitudes(solver, size, error):
-    profile = blazed(0.8, 0.1)
-    surface, solver = grating(profile, "Al"), solver(profile, size)
-    there = solver.amplitudes(surface.station(2, 0, 0.3, 0.5, [0.5]))
-    back = solver.amplitudes(surface.station(2, 0, 0.7, 0.5, [0.5]))
-    # the solver's own error with so many points or harmonics
-    assert np.abs(there - reversed_light(back)).max() < error
 
 
 def test_the_assembly_matches_the_documented_call_of_gratinglab(monkeypatch, tmp_path):
