@@ -124,16 +124,6 @@ def test_a_metal_under_a_coat_has_the_matrices_of_both_mirrors(polarised, mode):
 
 
 @kernels_alone
-def test_the_first_entry_is_the_light_of_unpolarised_variants(polarised):
-    table, wo = shallow_grating(INDEX, 0.1), WI * [-1, -1, 1]
-    polarised_light = matrices(load(table), WI, wo, "Radiance")[..., 0, 0]
-    mi.set_variant("llvm_ad_spectral")
-    si = interaction(WI, np.tile(LAM, (len(WI), 1)))
-    value = np.array(load(table).eval(mi.BSDFContext(), si, mi.Vector3f(wo.T)), float).T
-    assert polarised_light == pytest.approx(value, rel=1e-5)  # single precision
-
-
-@kernels_alone
 def test_a_spectrometer_sees_fresnel_s_reflectances_of_a_flat_metal(polarised):
     spectra = md.spectrum(
         load(shallow_grating(INDEX)), 56.0, [56.0], light_azimuth=25.0, relative="mirror",
