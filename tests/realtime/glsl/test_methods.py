@@ -27,7 +27,6 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_beneath,
     pack_boundary,
     pack_colours,
-    pack_conductor,
     pack_energy,
     pack_powers,
     pack_responses,
@@ -44,7 +43,6 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     paired,
     shortened,
 )
-from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.colour import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
@@ -242,25 +240,6 @@ def test_a_coherent_sum_is_refused_by_exact(patch: HeightField) -> None:
     table = DiffractionTable.build(patch, coherence_width=6.5, coherence="patch")
     with pytest.raises(DiffractionError, match=r"coherence='patch'.*use method fast"):
         pack_powers(table)
-
-
-def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTable) -> None:
-    lam = np.array([360.0, 500.0, 520.0, 830.0])
-    eta, k = np.array([1.5, 1.4, 0.3, 0.2]), np.array([1.9, 1.8, 2.5, 5.0])  # like gold
-    at = places(60)
-    at = at[np.hypot(at[:, 0], at[:, 1]) > 0.1]  # beside order 0, which has an angle of its own
-    at[:, 3] = np.linspace(0.2, 1.0, len(at))
-    packed = pack_powers(table) | pack_responses(DAYLIGHT) | pack_conductor(lam, eta, k)
-    found = probed(gl, "exact", packed, at)
-
-    fine = np.arange(376.0, 744.0, 0.25) + 0.125
-    index = np.interp(fine, lam, eta) + 1j * np.interp(fine, lam, k)
-    reflected = reflectance(at[:, 3], index[:, None])
-    exact = np.array(
-        [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(len(at))]
-    )
-    # 64 wavelengths of the reflectance's table; a perfect mirror's is below 2e-3
-    assert difference(found, exact) < 8e-3
 
 
 @pytest.mark.parametrize("method", METHODS)
