@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from scipy.special import jv
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
+from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, turn
 from mitsuba_diffraction.reference.model import small_slope
 from tests.support.directions import Array
@@ -71,16 +71,10 @@ def thin_grating(
 @functools.cache
 def listed_grating() -> OrderTable:
     """`thin_grating` in light from -20, 0 and 20° alone."""
-    light = itertools.product(range(380, 781, 50), (-20, 0, 20), range(-6, 7))
-    lam, theta, m = np.array(list(light)).T
-    sine = np.sin(np.radians(theta))
-    values = thin_grating().efficiency(-sine, 0.0, lam, m)
-    leaves = np.abs(m * lam / (1e3 * PERIOD) - sine) < 1.0
-    columns = (part[leaves].tolist() for part in (lam, theta, m, values, values))
-    lines = ["wavelength_nm,theta_deg,order,R_s,R_p"]
-    lines += [",".join(map(str, row)) for row in zip(*columns, strict=True)]
+    nm = np.arange(380.0, 781.0, 50.0)
     with tempfile.TemporaryDirectory() as folder:
-        (file := Path(folder, "thin_sinusoid.csv")).write_text("\n".join(lines), "utf-8")
+        file = Path(folder, "thin_sinusoid.csv")
+        list_orders(thin_grating(), nm, [-20.0, 0.0, 20.0]).save(file)
         return md.read_orders(file, PERIOD)
 
 

@@ -6,7 +6,6 @@ import dataclasses
 import json
 import os
 import tracemalloc
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,35 +16,21 @@ from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.files import TABLE_ATTRIBUTE
 from mitsuba_diffraction.tables.exr import write_channels
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
-from tests.support.directions import rough_patch
-from tests.support.table_files import Contents
+from tests.support.table_files import KINDS, PATCH, Contents, small_table
 
 #: Bytes: ten times what any takes, and a thousandth of what the damaged ones claim.
 MUCH = 1e6
-PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)
-#: Every layout of coefficients: half and single floats, one component and two, intervals; and of
-#: limits and windows.
-KINDS = {
-    "power, half": {"tolerance": 1e-3},
-    "power, single": {"tolerance": 1e-5},
-    "amplitude, half": {"coherence": "patch"},
-    "taylor": {"basis": "taylor"},
-    "limited": {"frequency_limit": 12.0},
-    "windows": {"heights": replace(PATCH, cut_out=True), "windows": 1.2},
-}
 
 
 @pytest.fixture(scope="module", params=KINDS)
 def table(request):
     """A small table of each kind."""
-    return DiffractionTable.build(
-        **({"heights": PATCH, "coherence_width": 1.8} | KINDS[request.param])
-    )
+    return small_table(request.param)
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return DiffractionTable.build(PATCH, coherence_width=1.8)
+    return small_table("power, half")
 
 
 @pytest.fixture

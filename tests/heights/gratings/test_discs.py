@@ -61,19 +61,14 @@ def test_short_runs_are_frequent(make, smooth):
 def test_pits_are_as_wide_and_deep_as_they_should_be(make, smooth):
     _, _, width, depth = STANDARD[make]
     assert smooth.range == pytest.approx(depth, abs=2e-6)  # rounding
-    line = track_lines(make, smooth)[0]
-    longest = np.flatnonzero(line != np.roll(line, 1))
-    middles = (longest[:-1:2] + longest[1::2]) // 2
     ny = smooth.shape[0] // 8
-    first = np.roll(smooth.heights[:ny], -_start(make, smooth), axis=1)[:, middles] < depth / 2
-    measured = first.sum(axis=0) * smooth.pixel_size[1]
+    line = smooth.heights[ny // 2] < depth / 2
+    ends = np.flatnonzero(line != np.roll(line, 1))
+    ends = ends[np.flatnonzero(line[ends])[0] :]  # from the first pit's beginning on
+    middles = (ends[:-1:2] + ends[1::2][: len(ends[:-1:2])]) // 2
+    measured = (smooth.heights[:ny, middles] < depth / 2).sum(axis=0) * smooth.pixel_size[1]
     # to a pixel, an eighth of a pit or finer
     assert np.abs(measured - width).max() <= 1.01 * smooth.pixel_size[1]
-
-
-def _start(make, field):
-    line = field.heights[field.shape[0] // 16] < STANDARD[make][3] / 2
-    return np.flatnonzero(line & ~np.roll(line, 1))[0]
 
 
 def test_tracks_throw_light_along_y(make):

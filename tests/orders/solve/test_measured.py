@@ -14,6 +14,7 @@ from scipy.io import netcdf_file
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.orders.listing import list_orders
 from tests.orders.kinds import light
 from tests.support.orders import thin_grating
 
@@ -43,18 +44,12 @@ def power(truth):
     return np.where(inside, truth.efficiency(x, y, lam, order), np.nan)
 
 
-def lines_of(power):
-    """Lines of a CSV."""
-    return [
-        ",".join(str(axis[n]) for axis, n in zip(AXES.values(), place, strict=True))
-        + f",{power[tuple(place)]},{power[tuple(place)]}\n"
-        for place in np.argwhere(~np.isnan(power))
-    ]
-
-
 @pytest.fixture(scope="module")
-def lines(power):
-    return lines_of(power)
+def lines(truth, tmp_path_factory):
+    """Lines of a CSV without the first."""
+    file = tmp_path_factory.mktemp("list") / "list.csv"
+    list_orders(truth, *list(AXES.values())[:3]).save(file)
+    return file.read_text().splitlines(keepends=True)[1:]
 
 
 def imported(path, period=PERIOD, **more):

@@ -9,7 +9,7 @@ from mitsuba_diffraction.orders.polarised import mueller_of
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
-from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, polygon, sinusoidal
 from mitsuba_diffraction.orders.solve.stations import Grating
 from mitsuba_diffraction.reference.boundary import mueller
 from mitsuba_diffraction.reference.model import small_slope
@@ -20,26 +20,46 @@ pytest.importorskip("gratinglab")
 RANGE = (400.0, 700.0)
 
 
-def grating(profile, material, superstrate=1.0):
-    return Grating(profile, material_of(material, RANGE), superstrate, RANGE)
+def grating(profile, material, superstrate=1.0, thin=False):
+    return Grating(profile, material_of(material, RANGE), superstrate, RANGE, thin=thin)
 
 
 def powers(solver, station):
     return np.abs(solver.amplitudes(station)) ** 2
 
 
-@pytest.mark.parametrize(
-    "profile", [lamellar(0.8, 0.1, 0.3), blazed(0.8, 0.1)], ids=lambda p: p.name[:7]
-)
-@pytest.mark.parametrize("place", [(1, 0, 0.3, 0.6), (2, 1, 0.6, 0.5)])
-def test_two_solvers_agree_on_dielectrics_in_conical_mounts(profile, place):
-    station = grating(profile, 1.5).station(*place, [0.2, 0.8])
-    integral = IntegralSolver(profile, 90).amplitudes(station)
-    coupled = CoupledWaves(profile, 12).amplitudes(station)
-    # phases too; 90 points are within 7e-3 of 200 (corners of the blaze), 12 harmonics of 40
-    assert np.abs(integral - coupled).max() < 1e-2
-    # 90 points are within 4e-3 of 200, 12 harmonics within 2e-3 of 40
-    assert np.abs(np.abs(integral) ** 2 - np.abs(coupled) ** 2).max() < 5e-3
+#: A ridge that leans over the groove, and the cross-section of a T.
+LEANING = polygon([(0.0, 0.0), (0.05, 0.1), (0.35, 0.1), (0.3, 0.0)], 0.8)
+T_SHAPED = polygon(
+    [(0.2, 0.0), (0.2, 0.05), (0.1, 0.05), (0.1, 0.1),
+     (0.6, 0.1), (0.6, 0.05), (0.4, 0.05), (0.4, 0.0)],
+    0.8,
+)  # fmt: skip
+WALLS = lamellar(0.8, 0.1, 0.3)
+#: Profiles, whether they are thin sheets, and places of stations.
+CLEAR = [
+    *((profile, False, (1, 0, 0.3, 0.6)) for profile in (WALLS, blazed(0.8, 0.1))),
+    *((profile, False, (2, 1, 0.6, 0.5)) for profile in (WALLS, blazed(0.8, 0.1))),
+    *((p, True, (2, 0, 0.3, 0.6)) for p in (WALLS, sinusoidal(0.8, 0.06), LEANING, T_SHAPED)),
+]
+
+
+@pytest.mark.parametrize(("profile", "thin", "place"), CLEAR)
+def test_two_solvers_agree_on_dielectrics_in_conical_mounts(profile, thin, place):
+    """Of sheets on light from above and from within."""
+    w = [0.2] if thin else [0.2, 0.8]
+    station = grating(profile, 1.58, thin=thin).station(*place, w)
+    integral = IntegralSolver(profile, 100).amplitudes(station)
+    coupled = CoupledWaves(profile, 14).amplitudes(station)
+    # phases too: 100 points are within 7e-3 of 200 or 400 (corners of the blaze and the T)
+    assert np.abs(integral - coupled).max() < 8e-3
+    if thin:
+        assert len(station.inside) == 5
+        # a clear material keeps all light; coupled waves do so to rounding
+        assert np.allclose((np.abs(coupled) ** 2).sum(axis=(3, 4)), 1.0, atol=1e-6)
+    else:
+        # 90 points are within 4e-3 of 200, 12 harmonics within 2e-3 of 40
+        assert np.abs(np.abs(integral) ** 2 - np.abs(coupled) ** 2).max() < 6e-3
 
 
 def test_two_solvers_agree_on_walls_of_aluminium():
