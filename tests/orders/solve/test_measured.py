@@ -220,27 +220,21 @@ def test_a_wrong_file_of_efficiencies_is_refused(lines, tmp_path, change, messag
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda axes, variables: axes.pop("theta"), "theta"),
-        (lambda axes, variables: variables.pop("R_p"), "R_p"),
-        (lambda axes, variables: axes.update(theta=np.full(18, 3.0)), "different"),
-        (lambda axes, variables: axes.update(theta=np.full(18, np.nan)), "finite"),
-        (lambda axes, variables: axes.update(wavelength=AXES["wavelength"] / 1e3), "unit"),
+        (lambda axes, variables, units: axes.pop("theta"), "theta"),
+        (lambda axes, variables, units: variables.pop("R_p"), "R_p"),
+        (lambda axes, variables, units: axes.update(theta=np.full(18, 3.0)), "different"),
+        (lambda axes, variables, units: axes.update(theta=np.full(18, np.nan)), "finite"),
+        (lambda axes, variables, units: axes.update(wavelength=AXES["wavelength"] / 1e3), "unit"),
+        (lambda axes, variables, units: units.update(wavelength="THz"), "THz"),
     ],
 )
 def test_a_wrong_netcdf_file_is_refused(power, tmp_path, change, message):
-    axes, variables, path = dict(AXES), content(power), tmp_path / "mine.nc"
-    change(axes, variables)
-    write_classic(path, axes, variables, {})
+    axes, variables, units, path = dict(AXES), content(power), {}, tmp_path / "mine.nc"
+    change(axes, variables, units)
+    write_classic(path, axes, variables, units)
     with pytest.raises(DiffractionError, match=message) as caught:
         md.read_orders(path, PERIOD)
     assert "\n" not in str(caught.value)
-
-
-def test_units_that_are_unknown_are_named(power, tmp_path):
-    path = tmp_path / "mine.nc"
-    write_classic(path, AXES, content(power), {"wavelength": "THz"})
-    with pytest.raises(DiffractionError, match="THz"):
-        md.read_orders(path, PERIOD)
 
 
 def test_units_that_are_missing_are_named_and_per_cent_are_converted(power, table, tmp_path):

@@ -30,6 +30,11 @@ def diffuse(value: float = 0.5) -> dict[str, Any]:
     return {"type": "diffuse", "reflectance": {"type": "rgb", "value": value}}
 
 
+def rectangle(at: Any, bsdf: Any = None) -> dict[str, Any]:
+    """A square from −1 to 1, transformed, by default of grey."""
+    return {"type": "rectangle", "to_world": at, "bsdf": bsdf or diffuse()}
+
+
 def plate_scene(table_file: Path, width: int = 160, **parts: Any) -> Any:
     """A plate at z = 0 seen from above, with something out of sight that diffracts."""
     T = mi.ScalarTransform4f
@@ -42,12 +47,11 @@ def plate_scene(table_file: Path, width: int = 160, **parts: Any) -> Any:
                 "to_world": T().look_at([0, -8, 1.5], [0, 0, 0], [0, 0, 1]),
                 "film": {"type": "hdrfilm", "width": width, "height": width // 4},
             },
-            "plate": {"type": "rectangle", "to_world": T().scale(4.0), "bsdf": diffuse()},
-            "skin": {
-                "type": "rectangle",
-                "to_world": T().translate([0, 8, -0.5]).scale(0.1),
-                "bsdf": {"type": "diffraction", "filename": str(table_file)},
-            },
+            "plate": rectangle(T().scale(4.0)),
+            "skin": rectangle(
+                T().translate([0, 8, -0.5]).scale(0.1),
+                {"type": "diffraction", "filename": str(table_file)},
+            ),
             **parts,
         }
     )
@@ -97,11 +101,7 @@ def test_the_penumbra_of_a_disc_is_that_of_the_path_tracer(
             "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 40.0}},
         },
         # from x = −5 to 0, out of the camera's sight
-        screen={
-            "type": "rectangle",
-            "to_world": T().translate([-5, 0, 2]).scale([5, 3, 1]),
-            "bsdf": diffuse(0.0),
-        },
+        screen=rectangle(T().translate([-5, 0, 2]).scale([5, 3, 1]), diffuse(0.0)),
     )
     # every other frame draws a light
     with drawn(gl, scene, 512, (192, 4)) as (renderer, image):
@@ -139,11 +139,10 @@ def test_shadows_have_neither_acne_nor_leaks(
             "p1": [1.3, -0.3, 0.4],
             "bsdf": {"type": "twosided", "bsdf": diffuse()},
         },
-        wall={
-            "type": "rectangle",
-            "to_world": T().translate([-0.6, 0.3, 0.5]).rotate([1, 0, 0], 90).scale([0.6, 0.5, 1]),
-            "bsdf": {"type": "twosided", "bsdf": diffuse()},
-        },
+        wall=rectangle(
+            T().translate([-0.6, 0.3, 0.5]).rotate([1, 0, 0], 90).scale([0.6, 0.5, 1]),
+            {"type": "twosided", "bsdf": diffuse()},
+        ),
         box={"type": "cube", "to_world": box, "bsdf": diffuse()},
     )
     with drawn(gl, scene, 16, (160, 40)) as (renderer, image):
@@ -188,7 +187,7 @@ def test_steep_bumps_shade_themselves_as_in_the_path_tracer(
     }
     scene = plate_scene(
         table_file,
-        plate={"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(4.0), "bsdf": bumpy},
+        plate=rectangle(mi.ScalarTransform4f().scale(4.0), bumpy),
         lamp={"type": "directional", "direction": [1.0, 0.4, -high], "irradiance": 3.0},
     )
     with drawn(gl, scene, 16, (320, 80)) as (renderer, image):
@@ -209,12 +208,9 @@ def test_pigments_have_another_colour_in_each_light(
         table_file,
         lamp={"type": "directional", "direction": [0.3, 0.4, -1.0], "irradiance": bluish},
         other={"type": "point", "position": [0.0, 9.0, 0.5], "intensity": 3.0},
-        plate={"type": "rectangle", "to_world": T().scale(4.0), "bsdf": red},
-        wall={
-            "type": "rectangle", "bsdf": diffuse(0.0),
-            "to_world": T().translate([0, 5, 0]).rotate([1, 0, 0], 90).scale(9.0),
-        },
-    )  # fmt: skip
+        plate=rectangle(T().scale(4.0), red),
+        wall=rectangle(T().translate([0, 5, 0]).rotate([1, 0, 0], 90).scale(9.0), diffuse(0.0)),
+    )
     with drawn(gl, scene, 256, (40, 10)) as (renderer, image):
         found, expected = image[5, 20], truth(renderer, 64)[15:25, 70:90].mean(axis=(0, 1))
     assert found[0] == pytest.approx(expected[0], rel=0.05)  # how often the light is drawn
@@ -251,12 +247,11 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
         },
     }  # fmt: skip
     plates = {
-        name: {
-            "type": "rectangle", "bsdf": bsdf,
-            "to_world": T().translate([1.1 * (n % 4 - 1.5), 1.1 * (n // 4 - 0.5), 0]).scale(0.5),
-        }
+        name: rectangle(
+            T().translate([1.1 * (n % 4 - 1.5), 1.1 * (n // 4 - 0.5), 0]).scale(0.5), bsdf
+        )
         for n, (name, bsdf) in enumerate(materials.items())
-    }  # fmt: skip
+    }
     lamp = T().look_at([0, 2.5, 1.6], [0, 0, 0], [0, 0, 1]).scale(0.6)
     scene = mi.load_dict(
         {
@@ -294,13 +289,12 @@ def test_a_mirror_on_a_wide_plate_sees_nothing_beneath_it(
     T = mi.ScalarTransform4f
     scene = plate_scene(
         table_file,
-        plate={"type": "rectangle", "to_world": T().scale(400.0), "bsdf": diffuse()},
+        plate=rectangle(T().scale(400.0)),
         room={"type": "constant", "radiance": {"type": "rgb", "value": 0.5}},
-        mirror={
-            "type": "rectangle",
-            "to_world": T().translate([0.0, 0.0, 0.25]).rotate([1, 0, 0], 90).scale([1, 0.25, 1]),
-            "bsdf": {"type": "conductor", "material": "Au"},
-        },
+        mirror=rectangle(
+            T().translate([0.0, 0.0, 0.25]).rotate([1, 0, 0], 90).scale([1, 0.25, 1]),
+            {"type": "conductor", "material": "Au"},
+        ),
     )
     with drawn(gl, scene, 8, (160, 40)) as (renderer, image):
         found, expected = image[..., 1], truth(renderer, 16)[..., 1]
