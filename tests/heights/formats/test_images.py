@@ -89,6 +89,9 @@ def test_a_large_image_is_not_a_bomb(tmp_path, monkeypatch):
         warnings.simplefilter("error")
         field = HeightField.load(path, pixel_size=0.01, max_height=1)
     assert field.shape == (10, 12)
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 50)  # Pillow refuses twice as many
+    with pytest.raises(DiffractionError, match="too large"):
+        HeightField.load(path, pixel_size=0.01, max_height=1)
 
 
 SIZES = {"pixel_size": 0.1, "max_height": 0.5}
