@@ -142,12 +142,14 @@ def near_orders(table: OrderTable, n: int, seed: int = 5) -> tuple[Array, Array,
     return wi, wo, rng.random((n, 3)), wavelength
 
 
-def light_of(table: OrderTable, wi: Array, wo: Array, wavelength: Array) -> Array:
+def light_of(
+    table: OrderTable, wi: Array, wo: Array, wavelength: Array, width: float | None = None
+) -> Array:
     """Radiance f |cosθo| (n,) of surfaces that are turned by TURN: the reference's for grooves.
 
     Else by the formula of module `lobes`, with n² of the side that the light comes from.
     """
-    wi, wo = turned(wi, -TURN), turned(wo, -TURN)
+    wi, wo, width = turned(wi, -TURN), turned(wo, -TURN), width or width_of(table)
     values, above = np.zeros(len(wi)), np.array([1.0, 1.0, 0.0])
     for sides in sides_of(table):
         passed = wi[:, 2] * wo[:, 2] < 0.0
@@ -157,19 +159,21 @@ def light_of(table: OrderTable, wi: Array, wo: Array, wavelength: Array) -> Arra
         if not here.any():
             continue
         if table.block or np.isfinite(table.periods[1]):
-            values[here] = _by_lobes(table, efficiency, *light)
+            values[here] = _by_lobes(table, efficiency, *light, width)
             continue
         came, left = (w * above + np.abs(w) * (1.0 - above) for w in light[:2])
         values[here] = md.reference.orders_brdf(
             efficiency, table.period, came, left, light[2],
-            coherence_width=width_of(table), superstrate=table.superstrate,
+            coherence_width=width, superstrate=table.superstrate,
         )  # fmt: skip
     return values * np.abs(wo[:, 2])
 
 
-def _by_lobes(table: OrderTable, efficiency: Any, wi: Array, wo: Array, lam: Array) -> Array:
+def _by_lobes(
+    table: OrderTable, efficiency: Any, wi: Array, wo: Array, lam: Array, width: float
+) -> Array:
     came, left = indices(table, wi), indices(table, wo)
-    sigma, mirror = sigma_of(width_of(table)), -(came * wi)[:, :2].T
+    sigma, mirror = sigma_of(width), -(came * wi)[:, :2].T
     sharp, cut = sigma * wavenumber(lam), (sigma * w[:, 2] ** 2 for w in (wi, wo))
     whole = horizon_correction(*cut, wavenumber(lam))
     total, value = (came * wi + left * wo)[:, :2], np.zeros(len(wi))

@@ -23,8 +23,8 @@ from tests.orders.kinds import (
     turned,
 )
 from tests.support.chi_square import DISPERSED, Case, chi_square
-from tests.support.directions import polar
-from tests.support.lanes import interaction, vectors
+from tests.support.directions import polar, uniform_directions
+from tests.support.lanes import evaluated, interaction, vectors
 from tests.support.transmitting import OneSide
 from tests.support.variants import evaluate
 
@@ -83,6 +83,14 @@ def test_every_variant_has_the_same_light(every_variant, kind):
     assert (weight * density[:, None])[lit] == pytest.approx(
         there[lit], rel=2e-3, abs=1e-5 * np.abs(there).max()
     )
+
+
+@pytest.mark.parametrize(("kind", "width"), [("grooves", 3.2), ("crossed", 2.2)])
+def test_lobes_of_two_periods_overlap_and_add_up(some_variant, kind, width):
+    wi, wo = (uniform_directions(200, np.random.default_rng(seed), 0.3) for seed in (3, 4))
+    found = evaluated(loaded(kind, coherence_width=width), wi, wo, np.full((200, 4), NM))
+    expected = light_of(KINDS[kind](), wi, wo, np.full(200, NM), width)
+    assert np.abs(found[:, 0] - expected).sum() <= 3e-3 * expected.sum()  # half floats
 
 
 def test_in_grazing_light_order_0_alone_is_corrected():

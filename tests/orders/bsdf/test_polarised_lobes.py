@@ -30,7 +30,6 @@ VARIANTS = [
     "scalar_spectral_polarized",
     pytest.param("llvm_ad_spectral_polarized", marks=pytest.mark.thorough),
 ]
-kernels_alone = pytest.mark.parametrize("polarised", VARIANTS[1:], indirect=True)
 
 
 @pytest.fixture(params=VARIANTS)
@@ -57,20 +56,6 @@ def normalised(values: Array) -> Array:
     return values / values[..., :1, :1]
 
 
-@kernels_alone
-@pytest.mark.parametrize("mode", MODES)
-def test_a_flat_metal_polarises_as_mitsuba_s_conductor(polarised, mode):
-    spectra = {name: {"type": "uniform", "value": v} for name, v in (("eta", 0.9), ("k", 6.0))}
-    smooth = mi.load_dict({"type": "conductor", **spectra})
-    mirror = load(shallow_grating(INDEX), orientation=20.0)
-    found = normalised(matrices(mirror, WI, WI * [-1, -1, 1], mode))
-    si = interaction(WI, np.tile(LAM, (len(WI), 1)))
-    context = mi.BSDFContext(getattr(mi.TransportMode, mode))
-    weight = np.array(smooth.sample(context, si, 0.5, mi.Point2f(0.5))[1], float)
-    # linear interpolation in 32 cells along τ: 1.9e-3, 2e-4 in 64
-    assert found == pytest.approx(normalised(np.moveaxis(weight, (3, 2), (0, 1))), abs=3e-3)
-
-
 def test_a_table_of_efficiencies_depolarises(polarised):
     values = matrices(load(OrderTable.mirror(0.6)), WI, WI * [-1, -1, 1], "Radiance")
     assert np.all(values[..., 0, 0] > 0.0)
@@ -78,8 +63,9 @@ def test_a_table_of_efficiencies_depolarises(polarised):
     assert np.all(values == 0.0)
 
 
+@pytest.mark.parametrize("order", [0, 1])
 @pytest.mark.parametrize("mode", MODES)
-def test_orders_of_shallow_grooves_polarise_as_the_model_of_diffraction(polarised, mode):
+def test_orders_of_shallow_grooves_polarise_as_the_model_of_diffraction(polarised, mode, order):
     heights = 5e-4 * np.cos(2.0 * np.pi * np.arange(16) / 16)
     field = md.HeightField(np.tile(heights, (16, 1)), 0.6 / 16)
     model = load(
@@ -88,8 +74,8 @@ def test_orders_of_shallow_grooves_polarise_as_the_model_of_diffraction(polarise
     )  # fmt: skip
     grating = load(shallow_grating(INDEX, 0.1), orientation=20.0, coherence_width=60.0)
     wavelengths = np.full(4, 550.0)
-    turn = np.radians(20.0)
-    wo = -WI + [0.55 / 0.6 * np.cos(turn), 0.55 / 0.6 * np.sin(turn), 0.0]
+    turn, apart = np.radians(20.0), order * 0.55 / 0.6
+    wo = -WI + [apart * np.cos(turn), apart * np.sin(turn), 0.0]
     seen = np.hypot(wo[:, 0], wo[:, 1]) < 0.95
     wi, wo = WI[seen], wo[seen]
     wo[:, 2] = np.sqrt(1.0 - wo[:, 0] ** 2 - wo[:, 1] ** 2)
@@ -123,7 +109,7 @@ def test_a_metal_under_a_coat_has_the_matrices_of_both_mirrors(polarised, mode):
         assert found == pytest.approx(turned / turned[0, 0], abs=0.015)
 
 
-@kernels_alone
+@pytest.mark.parametrize("polarised", VARIANTS[1:], indirect=True)
 def test_a_spectrometer_sees_fresnel_s_reflectances_of_a_flat_metal(polarised):
     spectra = md.spectrum(
         load(shallow_grating(INDEX)), 56.0, [56.0], light_azimuth=25.0, relative="mirror",
