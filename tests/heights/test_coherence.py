@@ -100,21 +100,6 @@ def test_one_window_has_one_width(width):
     assert resolved(TableSettings(windows=4.0), [scan()]).width == 4.0
 
 
-@given(st.floats(0.0, 1.0))
-def test_lobes_of_a_patch_as_wide_as_the_window_add_up_evenly(place):
-    """Poisson: Σ exp(−σ²(q − 2πn/L)²) = mean · (1 + 2 exp(−(L/2σ)²) cos(Lq) + …), 4σ = L."""
-
-    def sums(sigma, side):
-        orders = np.arange(-60, 61)
-        return np.exp(-((sigma * 2 * np.pi / side * (place - orders)) ** 2)).sum()
-
-    mean = np.sqrt(np.pi) / (2 * np.pi / 4)
-    assert sums(1.0, 4.0) == pytest.approx(mean, rel=0.037)  # 2 exp(−4) = 0.0366
-    # the README's scan of 10 µm under 65 µm: dark between the orders
-    if abs(place - 0.5) < 0.3:
-        assert sums(65 / 4, 10.0) < 0.02  # of a lobe's peak: exp(−(0.2·2πσ/L)²) = 0.016
-
-
 @pytest.mark.parametrize("window", [97.0, 131.0, 230.0])
 def test_windows_of_a_scan_are_no_longer_than_asked_and_reach_its_end(window):
     starts, length = window_places(1000, window)

@@ -259,14 +259,14 @@ def test_the_page_shows_them_as_the_path_tracer_does(
     check(stage, Halves(first, 2.0 * whole - first), names, 30)
 
 
-def balls(stage: Stage, folder: Path) -> dict[str, Any]:
-    """One ball of each surface, in rows; triangles of every other one are clockwise."""
+def dice(stage: Stage) -> dict[str, Any]:
+    """One cube of each surface, in rows; every other one is mirrored, with clockwise triangles."""
     T = mi.ScalarTransform4f
-    files = [ball(folder, clockwise) for clockwise in (False, True)]
     shapes = {
-        f"ball {n}": {
-            "type": "ply", "filename": files[n % 2], "bsdf": bsdf,
-            "to_world": T().translate([2.2 * (n % 6) - 5.5, 2.2 * (n // 6) - 6.6, 0.0]),
+        f"die {n}": {
+            "type": "cube", "bsdf": bsdf,
+            "to_world": T().translate([2.2 * (n % 6) - 5.5, 2.2 * (n // 6) - 6.6, 0.0])
+            @ T().rotate([1, 2, 3], 50).scale([0.7 * (-1.0) ** n, 0.7, 0.7]),
         }
         for n, bsdf in enumerate(stage.bsdfs.values())
     }  # fmt: skip
@@ -282,27 +282,11 @@ def balls(stage: Stage, folder: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def ball(folder: Path, clockwise: bool) -> str:
-    """Write a ball whose triangles are clockwise, or counter-clockwise, from outside."""
-    rows, columns = 16, 32
-    theta, phi = np.meshgrid(
-        np.linspace(0.0, np.pi, rows + 1), np.linspace(0.0, 2.0 * np.pi, columns + 1), indexing="ij"
-    )
-    places = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-    a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).ravel()
-    b, c, d = a + 1, a + columns + 1, a + columns + 2
-    faces = np.concatenate([np.stack([a, c, b], 1)[columns:], np.stack([b, c, d], 1)[:-columns]])
-    faces = faces[:, ::-1] if clockwise else faces
-    return write_mesh(
-        folder / f"ball_{clockwise}.ply", places, places, np.stack([phi, theta], -1), faces
-    )
-
-
 def test_triangles_that_face_away_change_no_picture(
-    gl: Any, stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    gl: Any, stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Closed surfaces of all materials, drawn without the triangles that face away."""
-    scene = mi.load_dict(balls(stage, tmp_path))
+    scene = mi.load_dict(dice(stage))
     enable, drawn, pictures = renderer.enable_sides, list[int](), []
 
     def noted(context: Any, winding: int) -> None:

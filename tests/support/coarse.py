@@ -6,7 +6,8 @@ is seconds of work for each table, material and film, and a fraction of that her
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 
@@ -30,6 +31,16 @@ COARSE = EnergySettings(
 def coarse_energy() -> EnergySettings:
     """Conserve energy coarsely in this process from now on; return the settings before."""
     return use_energy_settings(COARSE)
+
+
+@contextlib.contextmanager
+def energy_as(settings: EnergySettings) -> Iterator[None]:
+    """Conserve energy by these settings in a `with` block."""
+    before = use_energy_settings(settings)
+    try:
+        yield
+    finally:
+        use_energy_settings(before)
 
 
 #: Points and cells of the light between surfaces, and height scales of pages, as powers of 2.

@@ -13,6 +13,7 @@ from scipy.special import jv
 
 from mitsuba_diffraction import OrderTable, read_orders
 from mitsuba_diffraction.optics.orders import crossed_square, order_factor
+from mitsuba_diffraction.orders.listing import Listing
 
 PERIODS, RANGE = (0.8, 1.1), (450.0, 650.0)
 #: Reflectance; and amplitudes of the sine waves along x and y, µm.
@@ -89,10 +90,8 @@ def _imported(grid: Efficiencies) -> OrderTable:
 
 def save_csv(grid: Efficiencies, path) -> None:
     """Write a grid as the long CSV that `read_orders` reads."""
-    lines = ["wavelength_nm,theta_deg,phi_deg,order_x,order_y,R_s,R_p"]
-    for place in np.argwhere(~np.isnan(grid.values[..., 0])):
-        a, b, c, k = place
-        light = grid.wavelengths[a], grid.theta[b], grid.phi[c]
-        values = (*light, *grid.orders[k], *grid.values[tuple(place)])
-        lines.append(",".join(f"{value:.9g}" for value in values))
-    path.write_text("\n".join(lines) + "\n")
+    a, b, c, k = np.argwhere(~np.isnan(grid.values[..., 0])).T
+    light = grid.wavelengths[a], grid.theta[b], grid.phi[c]
+    names = "wavelength_nm", "theta_deg", "phi_deg", "order_x", "order_y", "R_s", "R_p"
+    rows = np.column_stack([*light, grid.orders[k], grid.values[a, b, c, k]])
+    Listing(names, rows).save(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,10 @@ from scipy.special import jv
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
+from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.reference.boundary import mueller, polarisation_axes, turn
 from mitsuba_diffraction.reference.model import small_slope
-from tests.support.directions import Array, as_single, uniform_directions
+from tests.support.directions import Array
 
 PERIOD = 1.6  # µm
 #: Light of a thin sheet from above (first row) and below that stays above (first column) or below.
@@ -71,16 +71,10 @@ def thin_grating(
 @functools.cache
 def listed_grating() -> OrderTable:
     """`thin_grating` in light from -20, 0 and 20° alone."""
-    light = itertools.product(range(380, 781, 50), (-20, 0, 20), range(-6, 7))
-    lam, theta, m = np.array(list(light)).T
-    sine = np.sin(np.radians(theta))
-    values = thin_grating().efficiency(-sine, 0.0, lam, m)
-    leaves = np.abs(m * lam / (1e3 * PERIOD) - sine) < 1.0
-    columns = (part[leaves].tolist() for part in (lam, theta, m, values, values))
-    lines = ["wavelength_nm,theta_deg,order,R_s,R_p"]
-    lines += [",".join(map(str, row)) for row in zip(*columns, strict=True)]
+    nm = np.arange(380.0, 781.0, 50.0)
     with tempfile.TemporaryDirectory() as folder:
-        (file := Path(folder, "thin_sinusoid.csv")).write_text("\n".join(lines), "utf-8")
+        file = Path(folder, "thin_sinusoid.csv")
+        list_orders(thin_grating(), nm, [-20.0, 0.0, 20.0]).save(file)
         return md.read_orders(file, PERIOD)
 
 
@@ -141,46 +135,6 @@ def groove_axis(direction: Array) -> Array:
 def load(table: Any, **parameters: Any) -> Any:
     """A table or heights as a BSDF of the current variant."""
     return mi.load_dict(md.bsdf_dict(table, **parameters))
-
-
-def on_all_sides(wi: Array, wo: Array) -> tuple[Array, Array]:
-    """Pairs with ωi and ωo above or below by turns."""
-    n = np.arange(len(wi))
-    wi, wo = wi.copy(), wo.copy()
-    wi[:, 2] *= np.where(n % 2, -1.0, 1.0)
-    wo[:, 2] *= np.where(n // 2 % 2, -1.0, 1.0)
-    return wi, wo
-
-
-def reference_light(table: OrderTable, wi: Array, wo: Array, wavelength: Array) -> Array:
-    """The reference times |cosθo|; of a thin sheet for directions above or below."""
-    values, up = np.zeros(len(wi)), np.array([1.0, 1.0, -1.0])
-    for from_below, transmitted in itertools.product((False, True)[: table.sides], repeat=2):
-        here = ((wi[:, 2] < 0.0) == from_below) & ((wi[:, 2] * wo[:, 2] < 0.0) == transmitted)
-        efficiency = functools.partial(
-            table.efficiency, from_below=from_below, transmitted=transmitted
-        )
-        came = wi[here] * up if from_below else wi[here]
-        left = wo[here] * up if from_below != transmitted else wo[here]
-        lam = wavelength[here]
-        values[here] = md.reference.orders_brdf(efficiency, table.period, came, left, lam)
-    return values * np.abs(wo[:, 2])
-
-
-def lit_pairs(n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:
-    """Directions in lobes of orders of the first of four wavelengths, and random numbers."""
-    rng = np.random.default_rng(seed)
-    wi = uniform_directions(n, rng, 0.15)
-    wavelength = as_single(rng.uniform(400.0, 700.0, (n, 4)))
-    wo = np.empty((n, 3))
-    for row in range(n):
-        squared = 2.0
-        while squared > 0.98:
-            shift = [rng.integers(-4, 5) * wavelength[row, 0] / (1e3 * PERIOD), 0.0]
-            tangential = shift - wi[row, :2] + rng.normal(0.0, 0.003, 2)
-            squared = (tangential**2).sum()
-        wo[row] = [*tangential, np.sqrt(1.0 - squared)]
-    return wi, as_single(wo), rng.random((n, 3)), wavelength
 
 
 def digest_in_file(table: OrderTable, folder: Path) -> str:

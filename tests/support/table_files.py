@@ -5,13 +5,34 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import OpenEXR
 
+from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.files import TABLE_ATTRIBUTE
+from tests.support.directions import rough_patch
+
+PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)
+#: Every layout of coefficients: half and single floats, one component and two, intervals; and of
+#: limits and windows.
+KINDS: dict[str, dict[str, Any]] = {
+    "power, half": {"tolerance": 1e-3},
+    "power, single": {"tolerance": 1e-5},
+    "chebyshev": {"basis": "chebyshev"},
+    "amplitude, half": {"coherence": "patch"},
+    "taylor": {"basis": "taylor"},
+    "limited": {"frequency_limit": 12.0},
+    "windows": {"heights": replace(PATCH, cut_out=True), "windows": 1.2},
+}
+
+
+def small_table(kind: str) -> DiffractionTable:
+    """A small table of a kind."""
+    return DiffractionTable.build(**({"heights": PATCH, "coherence_width": 1.8} | KINDS[kind]))
 
 
 def document_in(path: str | os.PathLike[str]) -> dict[str, Any]:

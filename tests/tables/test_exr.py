@@ -5,10 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import subprocess
-import sys
 import tracemalloc
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,35 +16,21 @@ from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.files import TABLE_ATTRIBUTE
 from mitsuba_diffraction.tables.exr import write_channels
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
-from tests.support.directions import rough_patch
-from tests.support.table_files import Contents
+from tests.support.table_files import KINDS, PATCH, Contents, small_table
 
 #: Bytes: ten times what any takes, and a thousandth of what the damaged ones claim.
 MUCH = 1e6
-PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)
-#: Every layout of coefficients: half and single floats, one component and two, intervals; and of
-#: limits and windows.
-KINDS = {
-    "power, half": {"tolerance": 1e-3},
-    "power, single": {"tolerance": 1e-5},
-    "amplitude, half": {"coherence": "patch"},
-    "taylor": {"basis": "taylor"},
-    "limited": {"frequency_limit": 12.0},
-    "windows": {"heights": replace(PATCH, cut_out=True), "windows": 1.2},
-}
 
 
 @pytest.fixture(scope="module", params=KINDS)
 def table(request):
     """A small table of each kind."""
-    return DiffractionTable.build(
-        **({"heights": PATCH, "coherence_width": 1.8} | KINDS[request.param])
-    )
+    return small_table(request.param)
 
 
 @pytest.fixture(scope="module")
 def whole():
-    return DiffractionTable.build(PATCH, coherence_width=1.8)
+    return small_table("power, half")
 
 
 @pytest.fixture
@@ -243,30 +226,3 @@ def test_a_writer_that_loses_the_error_of_a_full_disk_is_found_out(tmp_path, mon
         write_channels(target, {"Y": np.ones((2, 2), np.float32)})
     assert target.read_text() == "before"
     assert os.listdir(tmp_path) == ["a.exr"]
-
-
-def test_a_full_disk_is_one_line_and_leaves_nothing(saved, tmp_path):
-    # a limit on the size of files is what a full disk is like without one
-    code = (
-        "import resource, signal, sys\n"
-        "from mitsuba_diffraction import DiffractionError, DiffractionTable\n"
-        f"table = DiffractionTable.load({str(saved)!r})\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
-        "try:\n"
-        "    table.save('out.exr')\n"
-        "except DiffractionError as error:\n"
-        "    sys.exit(str(error))\n"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert result.returncode == 1
-    (line,) = result.stderr.splitlines()
-    assert line.startswith("cannot write 'out.exr': ")
-    assert sorted(os.listdir(tmp_path)) == ["table.exr"]

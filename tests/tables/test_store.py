@@ -42,14 +42,14 @@ def unpack(record):
     return Stored((record.document["text"], *record.arrays))
 
 
-def get(made, memory=None, key=KEY, kind="values"):
+def get(made, key=KEY, kind="values"):
     """VALUES with a text, counted in `made` where they are made."""
 
     def make():
         made.append(key)
         return Stored(("a text", VALUES, VALUES[0].astype(np.float16)))
 
-    return cached(kind, key, {} if memory is None else memory, make, pack, unpack)
+    return cached(kind, key, {}, make, pack, unpack)
 
 
 def test_a_later_process_reads_the_same_numbers(folder):
@@ -61,11 +61,6 @@ def test_a_later_process_reads_the_same_numbers(folder):
         assert before.dtype == after.dtype
         np.testing.assert_array_equal(before, after)
     assert [path.suffix for path in folder.iterdir()] == [".cache"]
-
-
-def test_this_process_keeps_it_in_memory():
-    memory = {}
-    assert get([], memory) is get([], memory)
 
 
 def test_any_damage_is_made_again_with_one_line(folder):

@@ -15,21 +15,10 @@ from scipy.special import jv
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
 from tests.support import ROOT
-from tests.support.directions import rough_patch
-from tests.support.table_files import document_in
+from tests.support.table_files import KINDS, PATCH, document_in, small_table
 
 PAGE = (ROOT / "docs" / "table-format.md").read_text("utf-8")
 WRITER, READER = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
-
-PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)
-KINDS = {
-    "svd": {},
-    "chebyshev": {"basis": "chebyshev"},
-    "single floats": {"tolerance": 1e-5},
-    "amplitudes": {"coherence": "patch"},
-    "taylor": {"basis": "taylor"},
-    "limited": {"frequency_limit": 12.0},
-}
 
 
 @pytest.fixture(scope="module")
@@ -44,11 +33,11 @@ def examples(tmp_path_factory):
     return names, printed.getvalue(), folder / "sinusoid.exr"
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "windows"])
 def test_the_page_s_reader_finds_the_orders_of_our_tables(examples, tmp_path, kind):
     power = examples[0]["power"]
     file = tmp_path / "table.exr"
-    table = DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS[kind])
+    table = small_table(kind)
     table.save(file)
     orders = np.array([(x, y) for x in (-1, 0, 1) for y in (-2, -1, 0, 1, 2)])
     far = np.any(orders != 0, axis=1)
@@ -112,7 +101,7 @@ def test_the_plugin_takes_what_the_page_s_writer_wrote(examples, some_variant):
 
 def test_the_page_describes_every_field(tmp_path):
     file = tmp_path / "table.exr"
-    DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS["limited"]).save(file)
+    small_table("limited").save(file)
     document = document_in(file)
     own = PAGE.split("## Tables of solved orders")[0]
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", own, re.M)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -57,6 +59,14 @@ def test_the_blazed_grating_follows_the_grating_equation(of_blazed, name):
     assert fit.points == len(WAVELENGTHS)
 
 
+def made_up(places, beam=None, wavelengths=WAVELENGTHS, angles=ANGLES, sigma=16.0) -> Response:
+    """Lobes of a window at frequencies (n, 1) or one, in rad/µm, of each wavelength."""
+    beam = beam or Beam()
+    u = beam.sine - np.sin(np.radians(angles))
+    values = np.exp(-(sigma**2) * (2e3 * np.pi / wavelengths[:, None] * u - places) ** 2)
+    return Response(beam, wavelengths, angles, values, sigma, "made up")
+
+
 @settings(max_examples=15)
 @given(
     st.floats(0.8, 3.0),
@@ -65,13 +75,8 @@ def test_the_blazed_grating_follows_the_grating_equation(of_blazed, name):
     st.sampled_from([0.0, 90.0, 180.0]),
 )
 def test_a_made_up_ridge_is_fitted(period, theta, order, phi):
-    beam = Beam(theta, phi)
-    angles = np.linspace(-89.0, 89.0, 3561)
-    sigma = 16.0
-    u = beam.sine - np.sin(np.radians(angles))
-    k = 2e3 * np.pi / WAVELENGTHS[:, None]
-    values = np.exp(-(sigma**2) * (k * u - order * 2 * np.pi / period) ** 2)
-    ridge = ridge_of(Response(beam, WAVELENGTHS, angles, values, sigma, "made up"), order)
+    beam, angles = Beam(theta, phi), np.linspace(-89.0, 89.0, 3561)
+    ridge = ridge_of(made_up(order * 2 * np.pi / period, beam, angles=angles), order)
     within = np.abs(beam.grating_angles(WAVELENGTHS, period, order)) < 85.0
     if within.sum() < 5:
         with pytest.raises(DiffractionError, match="too few to fit a period"):
@@ -83,14 +88,10 @@ def test_a_made_up_ridge_is_fitted(period, theta, order, phi):
 
 
 def test_outliers_do_not_move_the_fit():
-    beam, sigma = Beam(), 16.0
     wavelengths = np.arange(380.0, 781.0, 10.0)
-    u = beam.sine - np.sin(np.radians(ANGLES))
-    k = 2e3 * np.pi / wavelengths[:, None]
     where = np.full((wavelengths.size, 1), 2 * np.pi / 1.2)
     where[5:10] = 2 * np.pi / 0.9
-    values = np.exp(-(sigma**2) * (k * u - where) ** 2)
-    fit = fit_period(ridge_of(Response(beam, wavelengths, ANGLES, values, sigma, "jumps")))
+    fit = fit_period(ridge_of(made_up(where, wavelengths=wavelengths)))
     assert fit.period == pytest.approx(1.2, rel=0.01)
     assert fit.largest > 1.0  # and is told
 
@@ -130,11 +131,10 @@ def test_a_measured_scale_has_the_period_of_its_fingers(shared_afm):
 
 def test_light_that_follows_no_grating_equation_is_passed_over():
     """A broad and brighter maximum near the mirror, as a bent scale has, beside the grating's."""
-    beam, sigma = Beam(), 16.0
-    line = (beam.sine - np.sin(np.radians(ANGLES))) / (WAVELENGTHS[:, None] * 1e-3)
-    values = np.exp(-((2 * np.pi * sigma * (line - 1 / 0.9)) ** 2))
-    values += 3.0 * np.exp(-(((line - 0.15) / 0.05) ** 2))
-    response = Response(beam, WAVELENGTHS, ANGLES, values, sigma, "bent")
+    line = (Beam().sine - np.sin(np.radians(ANGLES))) / (WAVELENGTHS[:, None] * 1e-3)
+    response = made_up(2 * np.pi / 0.9)
+    broad = 3.0 * np.exp(-(((line - 0.15) / 0.05) ** 2))
+    response = replace(response, values=response.values + broad)
     assert fit_period(ridge_of(response)).period > 5.0  # what is brightest
     fit = fit_period(ridge_of(response, period=find_period(response, [0.93])))
     assert fit.period == pytest.approx(0.9, rel=1e-3)

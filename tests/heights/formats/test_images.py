@@ -13,11 +13,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import OpenEXR
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from PIL import Image
 
-from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 from tests.support.refusals import refusal
 
@@ -91,6 +89,9 @@ def test_a_large_image_is_not_a_bomb(tmp_path, monkeypatch):
         warnings.simplefilter("error")
         field = HeightField.load(path, pixel_size=0.01, max_height=1)
     assert field.shape == (10, 12)
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 50)  # Pillow refuses twice as many
+    with pytest.raises(DiffractionError, match="too large"):
+        HeightField.load(path, pixel_size=0.01, max_height=1)
 
 
 SIZES = {"pixel_size": 0.1, "max_height": 0.5}
@@ -209,12 +210,6 @@ def test_truncated_files_are_refused(tmp_path, name, capfd):
     assert all("EXR_ERR" in line for line in err.splitlines())
 
 
-HEADS = [
-    b"", b"\x89PNG\r\n\x1a\n", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"BM", b"II*\0", b"MM\0*",
-    b"\x76\x2f\x31\x01", b"\x76\x2f\x31\x01\x02\0\0\0", b"\x93NUMPY\x01\0",
-]  # fmt: skip
-
-
 def test_signalling_not_a_numbers_are_one_clear_line(tmp_path):
     heights = np.zeros((4, 4), np.float32)
     heights.view(np.uint32)[1, 2] = 0x7FA00000  # converting it raises the flag of an invalid value
@@ -222,45 +217,6 @@ def test_signalling_not_a_numbers_are_one_clear_line(tmp_path):
     with pytest.raises(DiffractionError) as caught:
         HeightField.load(tmp_path / "a.npy", pixel_size=0.1)
     assert "\n" not in str(caught.value)
-
-
-@settings(max_examples=80)
-@given(st.sampled_from(HEADS), st.binary(max_size=200), st.sampled_from([".png", ".exr", ".x"]))
-def test_random_bytes_are_one_clear_line(tmp_path, head, tail, suffix):
-    path = tmp_path / f"a{suffix}"
-    path.write_bytes(head + tail)
-    for options in ({}, {"pixel_size": 0.1}, SIZES):
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", DiffractionWarning)  # of what SIZES override
-                HeightField.load(path, **options)
-        except DiffractionError as error:
-            assert "\n" not in str(error)
-
-
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("samples")
-    for name in ("a.png", "a.bmp", "a.tif"):
-        Image.fromarray(BYTES).save(folder / name)
-    write_exr(folder / "a.exr", {"Y": FLOATS})
-    np.save(folder / "a.npy", FLOATS)
-    return folder
-
-
-@settings(max_examples=80)
-@given(st.data())
-def test_damaged_files_load_or_are_one_clear_line(samples, tmp_path, data):
-    name = data.draw(st.sampled_from(["a.png", "a.bmp", "a.tif", "a.exr", "a.npy"]))
-    content = bytearray((samples / name).read_bytes())
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path = tmp_path / name
-    path.write_bytes(content)
-    try:
-        HeightField.load(path, pixel_size=0.1, max_height=0.5 if name[2] in "pbt" else None)
-    except DiffractionError as error:
-        assert "\n" not in str(error)
 
 
 def test_a_tiff_whose_white_is_zero_is_as_high_as_it_is_bright(tmp_path):
@@ -300,27 +256,9 @@ def test_a_turned_tiff_keeps_its_rows_whatever_its_pixels(tmp_path, dtype):
 
 @pytest.mark.parametrize("order", "<>")
 def test_doubles_of_a_tiff_are_read(tmp_path, order):
-    heights = np.random.default_rng(2).random((5, 7))
-    data = heights.astype(f"{order}f8").tobytes()
-    tags = [
-        (256, 3, 1, 7),
-        (257, 3, 1, 5),
-        (258, 3, 1, 64),
-        (259, 3, 1, 1),
-        (262, 3, 1, 1),
-        (273, 4, 1, 8),
-        (277, 3, 1, 1),
-        (278, 3, 1, 5),
-        (279, 4, 1, len(data)),
-        (339, 3, 1, 3),
-    ]
-    entries = b"".join(
-        struct.pack(f"{order}HHI{'H2x' if kind == 3 else 'I'}", tag, kind, count, value)
-        for tag, kind, count, value in tags
-    )
-    head = (b"II*\0" if order == "<" else b"MM\0*") + struct.pack(f"{order}I", 8 + len(data))
-    path = tmp_path / "doubles.tif"
-    path.write_bytes(head + data + struct.pack(f"{order}H", len(tags)) + entries + bytes(4))
+    tifffile = pytest.importorskip("tifffile", reason="TIFF files need the extra afm")
+    heights, path = np.random.default_rng(2).random((5, 7)), tmp_path / "doubles.tif"
+    tifffile.imwrite(path, heights, byteorder=order, metadata=None)
     found = HeightField.load(path, pixel_size=0.1, level="none").heights
     np.testing.assert_array_equal(found, heights[::-1])
     packed = struct.pack(f"{order}HHIH", 259, 3, 1, 1), struct.pack(f"{order}HHIH", 259, 3, 1, 8)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
@@ -85,19 +85,20 @@ def test_any_parameters_work_or_are_one_clear_line(make, period, depth, pixels, 
 
 
 ALL = ("extent", "pixels", "seed", "depth", "irregularity")
+AMOUNTS = ("irregularity", "bending", "roughness", "dirt")
+#: Makers of random patches, by the name of their kind: with their parameters and a small extent.
+RANDOM = {
+    "scales": ((elaphe_like, xenopeltis_like), (*ALL, *AMOUNTS[1:]), 3.0),
+    "discs": ((cd, dvd), (*ALL, "track_pitch"), 5.0),
+}
+ONE_OF_EACH = [elaphe_like, xenopeltis_like, cd, dvd]
 anything_else = anything | st.lists(st.floats(), max_size=3) | st.just(np.zeros(2))
 
 
-@pytest.mark.parametrize(
-    ("makers", "names", "extent"),
-    [
-        ((elaphe_like, xenopeltis_like), (*ALL, "bending", "roughness", "dirt"), 3.0),
-        ((cd, dvd), (*ALL, "track_pitch"), 5.0),
-    ],
-    ids=["scales", "discs"],
-)
+@pytest.mark.parametrize("kind", RANDOM)
 @given(data=st.data(), value=anything_else)
-def test_any_value_of_other_patches_works_or_is_one_clear_line(makers, names, extent, data, value):
+def test_any_value_of_other_patches_works_or_is_one_clear_line(kind, data, value):
+    makers, names, extent = RANDOM[kind]
     make, name = data.draw(st.sampled_from(makers)), data.draw(st.sampled_from(names))
     arguments = {"extent": extent, "pixels": 16, name: value}
     if name == "pixels" and isinstance(value, int) and value > 64:
@@ -109,3 +110,41 @@ def test_any_value_of_other_patches_works_or_is_one_clear_line(makers, names, ex
         assert "\n" not in text
         assert text.startswith(f"{make.__name__}: {name}:")
         assert "got" in text
+
+
+@settings(max_examples=80)
+@given(
+    make=st.sampled_from(ONE_OF_EACH),
+    extent=st.floats(4, 12) | st.tuples(st.floats(4, 12), st.floats(4, 12)),
+    pixels=st.integers(8, 64) | st.tuples(st.integers(8, 64), st.integers(8, 64)),
+    seed=st.integers(0, 2**63 - 1),
+    depth=st.floats(0, 10),
+    pitch=st.floats(0.7, 2.0),
+    amounts=st.fixed_dictionaries({name: st.floats(0, 3) for name in AMOUNTS}),
+)
+def test_parameters_in_range_give_a_patch(make, extent, pixels, seed, depth, pitch, amounts):
+    disc, irregularity = make in RANDOM["discs"][0], amounts["irregularity"]
+    own = {"irregularity": irregularity, "track_pitch": pitch} if disc else amounts
+    field = make(extent, pixels, seed, depth=depth, **own)
+    # six standard deviations of a disc's roughness on both sides
+    beyond = 6 * irregularity * 0.002 if disc else 0.0
+    assert -beyond <= field.heights.min()
+    assert field.heights.max() <= depth + beyond
+    if not disc:  # whole tracks fit into a disc
+        assert field.extent == pytest.approx(np.broadcast_to(extent, 2))
+
+
+@pytest.mark.parametrize("make", ONE_OF_EACH)
+def test_a_seed_gives_one_patch(make):
+    same, again, other = (make(extent=8.0, pixels=120, seed=seed) for seed in (3, 3, 4))
+    assert same.digest() == again.digest()
+    assert np.corrcoef(same.heights.ravel(), other.heights.ravel())[0, 1] < 0.9
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("make", ONE_OF_EACH)
+def test_the_seam_is_a_place_like_any_other(make, axis):
+    heights = np.moveaxis(make(extent=20.0, pixels=400, seed=3).heights, axis, 0)
+    steps = np.sqrt(np.mean((np.roll(heights, -1, axis=0) - heights) ** 2, axis=1))
+    # 399 steps inside: one more of the same kind lies beyond their extremes once in 200 times
+    assert steps[:-1].min() <= steps[-1] <= steps[:-1].max()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -36,24 +38,36 @@ def test_all_of_a_patch_is_the_patch():
 
 @pytest.mark.parametrize(
     ("size", "words"),
-    [((5, 1), "larger than the patch"), ((1, 2), "larger"), ((0.5, 1), "less than two pixels")],
-)
+    [
+        ((5, 1), "larger than the patch"), ((1, 2), "larger"), ((0.5, 1), "less than two pixels"),
+        ((2.0, 1.0, 2.5, 0.0), "leaves the patch"),
+    ],
+)  # fmt: skip
 def test_a_crop_that_is_not_there_is_refused_in_one_line(size, words):
     with pytest.raises(DiffractionError, match=words) as caught:
         crop(FIELD, size)
-    assert "the patch is 4 x 1.5 µm" in str(caught.value)
+    assert "is 4 x 1.5 µm" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("given", ["1", 1.0, "1, 1", (1, 1), [1.0, 1.0]])
-def test_files_recipes_and_memory_are_cropped_alike(tmp_path, given):
+@pytest.mark.parametrize(
+    ("given", "part", "note"),
+    [
+        *((one, np.s_[1:5, 3:5], "the middle") for one in ("1", 1.0, "1, 1", (1, 1), [1.0, 1.0])),
+        # a region elsewhere has its lower left corner
+        *((one, np.s_[1:5, 1:5], "from 1, 1") for one in ("2, 1, 0.5, 0.25", [2, 1, 0.5, 0.25])),
+    ],
+)
+def test_files_recipes_and_memory_are_cropped_alike(tmp_path, given, part, note):
     np.save(tmp_path / "a.npy", GRID)
     loaded = HeightField.load(tmp_path / "a.npy", pixel_size=(0.5, 0.25), crop=given)
-    assert np.array_equal(loaded.heights, GRID[1:5, 3:5])
+    assert np.array_equal(loaded.heights, GRID[part])
     assert "cropped" in loaded.history[0]
+    assert note in loaded.history[0]
     assert FIELD.treated(crop=given).digest() == loaded.digest()
     recipe = tmp_path / "a.toml"
-    recipe.write_text('source = "a.npy"\npixel_size = [0.5, 0.25]\ncrop = 1.0\n')
+    crop = json.dumps(given)
+    recipe.write_text(f'source = "a.npy"\npixel_size = [0.5, 0.25]\ncrop = {crop}\n')
     assert HeightField.load(recipe).digest() == loaded.digest()
 
 
@@ -72,18 +86,6 @@ def test_gaps_outside_the_middle_do_not_matter_and_tilt_is_that_of_the_middle(tm
 def test_no_size_is_named(bad):
     with pytest.raises(DiffractionError, match="crop: expected a width or a pair"):
         FIELD.treated(crop=bad)
-
-
-def test_a_region_elsewhere_has_its_lower_left_corner(tmp_path):
-    part = FIELD.treated(crop="2, 1, 0.5, 0.25", level="none")
-    np.testing.assert_array_equal(part.heights, FIELD.heights[1:5, 1:5])
-    assert "from 1, 1" in part.history[-1]
-    with pytest.raises(DiffractionError, match="leaves the patch"):
-        FIELD.treated(crop=(2.0, 1.0, 2.5, 0.0))
-    recipe = tmp_path / "a.toml"
-    np.save(tmp_path / "a.npy", FIELD.heights)
-    recipe.write_text('source = "a.npy"\npixel_size = [0.5, 0.25]\ncrop = [2, 1, 0.5, 0.25]\n')
-    assert HeightField.load(recipe).digest() == part.digest()
 
 
 RNG = np.random.default_rng(11)
@@ -108,11 +110,6 @@ def test_plane_is_found_and_removed():
     assert line.startswith("plane removed: it rose 0.4 µm along x and -0.3 µm along y")
     # three digits are printed
     assert number_after("RMS change", line) == pytest.approx(tilted.rms_height, rel=5e-3)
-
-
-def test_levelling_twice_changes_nothing_more():
-    once = level_plane(HeightField(ROUGH + 0.003 * X, 0.1))
-    assert level_plane(once).heights == pytest.approx(once.heights, abs=1e-12)  # rounding
 
 
 def test_scan_lines_are_aligned():
@@ -200,13 +197,15 @@ def test_measured_points_stay_and_gaps_stay_within_their_range(method):
     assert method in line
 
 
-def test_harmonic_continues_a_plane_through_inner_gaps():
-    y, x = np.mgrid[0:40, 0:50]
-    plane = 0.1 * x - 0.05 * y + 3
-    holed = np.where(np.hypot(y - 20, x - 25) < 8, np.nan, plane)
+@pytest.mark.parametrize(("side", "radius"), [(50, 8), (200, 76)])
+def test_harmonic_continues_a_plane_through_inner_gaps(side, radius):
+    """Of up to 45 % of the patch."""
+    y, x = np.mgrid[0 : side - 10, 0:side] / side
+    plane = 5 * x - 2 * y + 3
+    holed = np.where(np.hypot(y - 0.4, x - 0.5) * side < radius, np.nan, plane)
     filled, _ = fill_missing(holed, "harmonic", "patch")
-    # a plane is harmonic; conjugate gradients stop at 1e-9 of the heights' norm, about 50
-    assert filled == pytest.approx(plane, abs=1e-6)
+    # a plane is harmonic; conjugate gradients stop at 1e-9 of the heights' norm, 1e3
+    assert filled == pytest.approx(plane, abs=1e-5)
 
 
 def test_nearest_takes_the_nearest_height():
@@ -223,14 +222,6 @@ def test_complete_heights_pass_untouched():
     assert line == ""
 
 
-def test_a_wide_gap_is_filled():
-    whole = np.add.outer(np.sin(np.arange(200) / 20), np.cos(np.arange(200) / 30))
-    holed = whole.copy()
-    holed[30:165, 30:165] = np.nan  # 46 % of the patch
-    filled, _ = fill_missing(holed, "harmonic", "patch")
-    assert np.isfinite(filled).all()
-
-
 @pytest.mark.parametrize(
     ("share", "method", "word"),
     [(0.1, None, "fill"), (0.7, "harmonic", "too many"), (1, "nearest", "empty")],
@@ -240,13 +231,6 @@ def test_what_cannot_be_filled_is_refused(share, method, word):
     heights.ravel()[: int(share * 100)] = np.nan
     with pytest.raises(DiffractionError, match=word):
         fill_missing(heights, method, "patch")
-
-
-def test_a_start_that_is_the_solution_is_left_as_it_is():
-    heights = np.ones((2, 4))
-    heights[1, 2:] = np.nan
-    filled, _ = fill_missing(heights, "harmonic", "two gaps")
-    assert np.array_equal(filled, np.ones((2, 4)))
 
 
 @pytest.mark.parametrize("method", FILLS)

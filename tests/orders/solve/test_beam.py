@@ -9,25 +9,12 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders.listing import list_orders
-from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.settings import Settings
-from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 
 #: One wavelength.
 GREEN = Settings(wavelengths=(550.0, 550.0))
-
-
-def test_a_flat_surface_reflects_s_and_p_of_conical_light_as_fresnel_says():
-    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
-        table = solve_orders(sinusoidal(0.6, 1e-6), "Al", theta=40.0, phi=60.0, settings=GREEN)
-    theta, phi = np.radians(40.0), np.radians(60.0)
-    x, y = -np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
-    index = material_of("Al", GREEN.wavelengths).index(550.0)
-    truth = np.abs(np.stack(fresnel(np.cos(theta), index))) ** 2
-    # 10⁻³ nm of the depth; single precision
-    np.testing.assert_allclose(table.polarised_efficiency(x, y, 550.0, 0), truth, atol=1e-4)
 
 
 def test_efficiencies_of_one_direction_are_those_solved():

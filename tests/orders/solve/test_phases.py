@@ -24,6 +24,14 @@ WAVENUMBER = 2e3 * np.pi / WAVELENGTH
 SETTINGS = Settings((WAVELENGTH, WAVELENGTH), polarised=True, resolution=12)
 
 
+def nearly_flat(walls, height=0.0):
+    """A profile 10⁻⁴ nm deep, of steps or smooth, at a height."""
+    steps = [(0.0, height), (0.3, height), (0.3, height - 1e-7), (0.6, height - 1e-7)]
+    u = np.arange(64) / 64
+    smooth = Profile(0.6 * u, height + 1e-7 * np.cos(2 * np.pi * u), 0.6)
+    return polygon(steps, 0.6) if walls else smooth
+
+
 def solved(profile, material, theta, phi, resolution=12, method="auto", **more):
     """Jones matrices by order of one light."""
     settings = Settings(
@@ -48,14 +56,11 @@ def listed(table, *light):
 @pytest.mark.parametrize("walls", [False, True])
 def test_a_raised_mirror_has_fresnel_s_amplitudes_and_the_phase_of_its_way(walls, light):
     """exp(−2ikh cosθ); r_s and r_p of a metal (Born and Wolf, section 1.5.2). Two solvers."""
-    height, u = 0.137, np.arange(64) / 64
-    steps = [(0.0, height), (0.3, height), (0.3, height - 1e-7), (0.6, height - 1e-7)]
-    smooth = Profile(0.6 * u, height + 1e-7 * np.cos(2 * np.pi * u), 0.6)
-    cosine = np.cos(np.radians(light[0]))
+    height, cosine = 0.137, np.cos(np.radians(light[0]))
     coefficients = fresnel(cosine, material_of("Al", SETTINGS.wavelengths).index(WAVELENGTH))
     expected = np.diag(coefficients) * np.exp(-2j * WAVENUMBER * height * cosine)
-    found = solved(polygon(steps, 0.6) if walls else smooth, "Al", *light)
-    # steps of 10⁻⁴ nm; the light 10⁻⁴° from the normal that stands for it
+    found = solved(nearly_flat(walls, height), "Al", *light)
+    # the depth; the light 10⁻⁴° from the normal that stands for it
     np.testing.assert_allclose(found[0,], expected, atol=5e-6)
 
 
@@ -69,13 +74,10 @@ def test_a_film_has_airy_s_amplitudes_at_the_level_of_the_metal(method):
     faces = zip(fresnel(cosine, film), fresnel(within, metal / film), strict=True)
     through = np.exp(2j * WAVENUMBER * film * thickness * within)
     airy = [(first + last * through) / (1.0 + first * last * through) for first, last in faces]
-    steps = [(0.0, 0.0), (0.3, 0.0), (0.3, -1e-7), (0.6, -1e-7)]
-    u = np.arange(64) / 64
-    smooth = Profile(0.6 * u, 1e-7 * np.cos(2 * np.pi * u), 0.6)
-    profile = polygon(steps, 0.6) if method == "coupled" else smooth
+    profile = nearly_flat(method == "coupled")
     found = solved(profile, "Al", 40.0, 60.0, method=method, layers=[(str(film), thickness)])
     expected = np.diag(airy) * np.exp(-2j * WAVENUMBER * thickness * cosine)
-    # steps of 10⁻⁴ nm
+    # the depth
     np.testing.assert_allclose(found[0,], expected, atol=5e-6)
 
 

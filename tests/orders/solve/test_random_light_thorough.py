@@ -27,6 +27,7 @@ from mitsuba_diffraction.orders.solve.profiles import (
 )
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating
+from tests.orders.kinds import light
 
 pytestmark = pytest.mark.thorough
 
@@ -39,30 +40,10 @@ CASES = {
 }
 
 
-def errors(name, monkeypatch):
-    """Missed share of the light of a direction, in all orders and both polarisations."""
-    profile, material, arguments, settings = CASES[name]
-    problems = []
-
-    def spy(table, problem, jobs):
-        problems.append(problem)
-        return measured_error(table, problem, jobs)
-
-    monkeypatch.setattr(orders, "measured_error", spy)
-    jobs = Jobs()
-    how = Settings(RANGE, **settings)
-    table = md.solve_orders(profile, material, settings=how, jobs=jobs, **arguments)
-    fine = replace(problems[-1], resolution=2 * problems[-1].resolution)
-    rng = np.random.default_rng(77)
-    radius, turn = np.sqrt(rng.random(LIGHTS)), 2.0 * np.pi * rng.random(LIGHTS)
-    light = radius * np.cos(turn), radius * np.sin(turn), rng.uniform(*RANGE, LIGHTS)
-    return missed(table, fine, jobs, *light)
-
-
 def missed(table, fine, jobs, x, y, lam):
     """Missed shares of a table beside solutions of a problem, of light (n,)."""
     lights = located(fine.grating, x, y, lam)
-    amplitudes = jobs.amplitudes(fine, [light.place for light in lights], "")
+    amplitudes = jobs.amplitudes(fine, [each.place for each in lights], "")
     index, shares = table.block or 1.0, []
     for n, (place, port, leaving) in enumerate(lights):
         guided = table.block and index * np.hypot(x[n], y[n]) >= 1.0
@@ -81,7 +62,19 @@ def missed(table, fine, jobs, x, y, lam):
 
 @pytest.mark.parametrize("name", CASES)
 def test_light_that_was_not_solved_has_the_light_of_a_direct_solution(name, monkeypatch):
-    shares = errors(name, monkeypatch)
+    """In all orders and both polarisations."""
+    profile, material, arguments, settings = CASES[name]
+    problems, jobs = [], Jobs()
+
+    def spy(table, problem, jobs):
+        problems.append(problem)
+        return measured_error(table, problem, jobs)
+
+    monkeypatch.setattr(orders, "measured_error", spy)
+    how = Settings(RANGE, **settings)
+    table = md.solve_orders(profile, material, settings=how, jobs=jobs, **arguments)
+    fine = replace(problems[-1], resolution=2 * problems[-1].resolution)
+    shares = missed(table, fine, jobs, *light(LIGHTS, 1.0, RANGE, seed=77))
     # of the order of a picture's noise; the worst lie beside surface plasmons, in TM
     assert shares.mean() < 0.015
     assert shares.max() < 0.05

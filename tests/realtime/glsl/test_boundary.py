@@ -24,6 +24,7 @@ from mitsuba_diffraction.reference import boundary, fresnel, model
 from mitsuba_diffraction.tables.colour import cached_colours
 from tests.realtime.glsl.shaders import DAYLIGHT, PERFECT, difference, paired, probed
 from tests.support.directions import as_single, uniform_directions
+from tests.support.formulas import Pairs, exact_power
 
 METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
 DIELECTRIC = Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"})
@@ -60,21 +61,12 @@ def factor(
     table: DiffractionTable, kind: str, wi: NDArray[Any], wo: NDArray[Any], lam: NDArray[Any]
 ) -> NDArray[np.float64]:
     """N' / (1 + ωi·ωo)² at wavelengths (m,), shape (n, m)."""
-    s = share(table, kind, wi + wo, lam)
-    jones = model.blended(wi[:, None], wo[:, None], index(kind, lam), s)
-    scale = 2 * wi[:, 2] * wo[:, 2] / (1 + np.sum(wi * wo, axis=1))
-    return boundary.unpolarised(jones) * scale[:, None] ** 2
-
-
-def share(
-    table: DiffractionTable, kind: str, total: NDArray[Any], lam: NDArray[Any]
-) -> NDArray[np.float64]:
-    """What small slope has of the blend, (n, m)."""
-    k = wavenumber(lam)
-    q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
-    return model.small_slope_weight(
-        HEIGHTS * total[:, 2:] * k, table.roughness.at(q), index(kind, lam)
-    )
+    total, powers = wi + wo, []
+    for k, n in zip(wavenumber(lam), index(kind, lam), strict=True):
+        variance = table.roughness.at(np.hypot(*total[:, :2].T) * k)
+        given = Pairs(wi, wo, HEIGHTS * total[:, 2] * k, variance)
+        powers.append(exact_power(given, n) / (1 + np.sum(wi * wo, axis=1)) ** 2)
+    return np.stack(powers, axis=1)
 
 
 def sloped(

@@ -26,7 +26,6 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
     pack_boundary,
     pack_colours,
-    pack_conductor,
     pack_directions,
     pack_powers,
     pack_responses,
@@ -43,7 +42,6 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     paired,
     shortened,
 )
-from mitsuba_diffraction.reference.fresnel import reflectance
 from mitsuba_diffraction.tables.colour import ColourTable, colour_difference
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
@@ -113,17 +111,25 @@ def test_two_numbers_lie_in_a_word(values: NDArray[np.float32]) -> None:
     np.testing.assert_allclose(shortened(values), values, rtol=2.0**-8, atol=1e-39)
 
 
-def test_exact_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable) -> None:
-    at = places(360)
-    found = probed(gl, "exact", pack_powers(table) | pack_responses(DAYLIGHT) | PERFECT, at)
-    exact = summed(table, at)
+@pytest.mark.parametrize(
+    ("lit", "bounds"),
     # cut windows 2e-4, lobes averaged at two points to third order: 4e-3 measured
-    assert difference(found, exact) < 8e-3
-    far = np.hypot(at[:, 0], at[:, 1]) > 0.5
-    assert difference(found[far], exact[far]) < 4e-3
-    close = np.hypot(at[:, 0], at[:, 1]) < 0.05
-    assert close.any()
-    assert difference(found[close], exact[close]) < 2e-3
+    [
+        (np.ones_like, (8e-3, 4e-3, 2e-3)),
+        (lambda lam: np.exp(-(((lam - 590.0) / 25.0) ** 2)), (1e-2, 1e-2, 4e-3)),
+    ],
+    ids=["daylight", "a light's own spectrum"],
+)
+def test_exact_sums_the_table_over_wavelengths(
+    gl: Any, table: DiffractionTable, lit: Any, bounds: tuple[float, ...]
+) -> None:
+    at, grid = places(360), np.arange(360.0, 831.0)
+    packed = pack_powers(table) | pack_responses([(grid, lit(grid))]) | PERFECT
+    found, exact = probed(gl, "exact", packed, at), summed(table, at, lit)
+    radius = np.hypot(at[:, 0], at[:, 1])
+    for part, bound in zip((radius >= 0.0, radius > 0.5, radius < 0.05), bounds, strict=True):
+        assert part.any()
+        assert difference(found[part], exact[part]) < bound
 
 
 def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
@@ -142,17 +148,6 @@ def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
         found = probed(gl, method, packed | PERFECT, at)
         for part in (slice(0, None, 2), slice(1, None, 2)):
             assert difference(found[part], expected[part]) < bound, method
-
-
-def test_exact_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable) -> None:
-    at = places(120)
-
-    def lit(lam: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.exp(-(((lam - 590.0) / 25.0) ** 2))
-
-    grid = np.arange(360.0, 831.0)
-    packed = pack_powers(table) | pack_responses([(grid, lit(grid))]) | PERFECT
-    assert difference(probed(gl, "exact", packed, at), summed(table, at, lit)) < 1e-2
 
 
 @pytest.mark.parametrize("wavelength", [400.0, 550.0, 700.0])
@@ -242,25 +237,6 @@ def test_a_coherent_sum_is_refused_by_exact(patch: HeightField) -> None:
     table = DiffractionTable.build(patch, coherence_width=6.5, coherence="patch")
     with pytest.raises(DiffractionError, match=r"coherence='patch'.*use method fast"):
         pack_powers(table)
-
-
-def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTable) -> None:
-    lam = np.array([360.0, 500.0, 520.0, 830.0])
-    eta, k = np.array([1.5, 1.4, 0.3, 0.2]), np.array([1.9, 1.8, 2.5, 5.0])  # like gold
-    at = places(60)
-    at = at[np.hypot(at[:, 0], at[:, 1]) > 0.1]  # beside order 0, which has an angle of its own
-    at[:, 3] = np.linspace(0.2, 1.0, len(at))
-    packed = pack_powers(table) | pack_responses(DAYLIGHT) | pack_conductor(lam, eta, k)
-    found = probed(gl, "exact", packed, at)
-
-    fine = np.arange(376.0, 744.0, 0.25) + 0.125
-    index = np.interp(fine, lam, eta) + 1j * np.interp(fine, lam, k)
-    reflected = reflectance(at[:, 3], index[:, None])
-    exact = np.array(
-        [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(len(at))]
-    )
-    # 64 wavelengths of the reflectance's table; a perfect mirror's is below 2e-3
-    assert difference(found, exact) < 8e-3
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -24,6 +24,7 @@ from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.glsl.export import export_shader, make_shader
 from mitsuba_diffraction.realtime.web.export import make_page
 from tests.support.browser import PATIENCE
+from tests.support.pictures import by_methods
 
 pytestmark = pytest.mark.thorough
 
@@ -181,16 +182,7 @@ def drawn(page: Any, options: str, lit: bool = True) -> NDArray[np.float32]:
 @pytest.fixture(scope="module")
 def ours(sphere: Any) -> dict[str, NDArray[np.float32]]:
     """Pictures of `Renderer`, by method."""
-    pytest.importorskip("moderngl")
-    from mitsuba_diffraction.realtime.glsl import Renderer
-
-    try:
-        renderer = Renderer(sphere)
-    except DiffractionError as error:
-        pytest.skip(str(error))
-    found = {m: renderer.render(m, supersampling=1) for m in ("fast", "exact")}
-    renderer.release()
-    return found
+    return by_methods(sphere, "fast", "exact")
 
 
 @pytest.mark.parametrize("method", ["fast", "exact"])

@@ -12,7 +12,8 @@ from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
 from mitsuba_diffraction.tables.energy.scaling import parallel, scaled
-from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+from mitsuba_diffraction.tables.energy.settings import EnergySettings
+from tests.support.coarse import energy_as
 from tests.support.directions import polar, rough_patch
 from tests.support.furnace import isotropic
 
@@ -141,7 +142,7 @@ def test_few_wide_orders_leave_at_the_azimuths_and_grazing_angles_of_the_model()
 
 
 def test_few_orders_of_wide_lobes_appear_over_the_width_of_a_lobe():
-    """An infrared blaze of 1.3 µm: one order's light between rows of the grid was up to 0.15 off."""
+    """An infrared blaze: the light of an order between rows of the grid was up to 0.15 off."""
     heights, light = 0.36 * np.tile(np.arange(40) / 40.0, (8, 1)), (970.0, 990.0)
     patch = md.HeightField(heights, 0.0326, periodic=True)
     table = md.DiffractionTable.build(patch, coherence_width=9.6, wavelength_range=light)
@@ -201,12 +202,9 @@ def test_a_grating_gains_nothing_between_nodes_either(tables, material):
 
 
 def test_coarser_settings_take_less_work_and_are_another_record(tables):
-    before = use_energy_settings(EnergySettings(polar=12, azimuthal=16, wavelengths=2, rings=12))
-    try:
+    with energy_as(EnergySettings(polar=12, azimuthal=16, wavelengths=2, rings=12)):
         mirror = SurfaceEnergy(tables["rough"], reflector("kirchhoff", None))
         scale = mirror.conservation((400.0, 700.0)).scale
-    finally:
-        use_energy_settings(before)
     assert scale is not None
     assert scale.values.shape == (2, 13, 16)
 

@@ -18,14 +18,20 @@ from mitsuba_diffraction.tables.order_mixture import order_mixture
 from mitsuba_diffraction.tables.powers import powers_at
 from tests.support.directions import polar, rough_patch
 
+PATCH = rough_patch((40, 44), (0.09, 0.09), 0.1)
+
+
+def gain_of(path):
+    roughness = ScaleRoughness.from_heights(PATCH.heights, PATCH.pixel_size)
+    return PathGain(path, roughness.table(50.0), 11.0, 1.0)
+
 
 def test_heights_scaled_alike_have_the_same_gain():
-    patch = rough_patch((40, 44), (0.09, 0.09), 0.1)
     light = np.array(0.7), np.array(0.5), 0.3
     gains = [
         PathGain(Path(0.9 + 6.0j, "small_slope"), roughness.table(50.0), 11.0, scale).exact(*light)
-        for heights, scale in ((patch.heights, 1.5), (1.5 * patch.heights, 1.0))
-        for roughness in [ScaleRoughness.from_heights(heights, patch.pixel_size)]
+        for heights, scale in ((PATCH.heights, 1.5), (1.5 * PATCH.heights, 1.0))
+        for roughness in [ScaleRoughness.from_heights(heights, PATCH.pixel_size)]
     ]
     assert gains[0] == pytest.approx(gains[1])
 
@@ -40,9 +46,7 @@ PATHS = [
 
 @pytest.mark.parametrize("path", PATHS)
 def test_tables_hold_the_boundary_s_gain_in_either_order_of_directions(path):
-    patch = rough_patch((40, 44), (0.09, 0.09), 0.1)
-    exact = ScaleRoughness.from_heights(patch.heights, patch.pixel_size)
-    gain = PathGain(path, exact.table(50.0), 11.0, 1.0)
+    gain = gain_of(path)
     rng = np.random.default_rng(4)
     cos_i, cos_o = rng.uniform(0.4, 0.98, (2, 400))
     turn = rng.uniform(-np.pi, np.pi, 400)
@@ -62,10 +66,7 @@ def test_tables_hold_the_boundary_s_gain_in_either_order_of_directions(path):
 @pytest.mark.parametrize("index", [1.5, 2.46])
 def test_tables_hold_the_root_at_a_critical_angle(index):
     """Light is let through towards directions within 3° of the critical angle."""
-    patch = rough_patch((40, 44), (0.09, 0.09), 0.1)
-    exact = ScaleRoughness.from_heights(patch.heights, patch.pixel_size)
-    path = Transmitter(index, "small_slope", False).paths(np.array([550.0]), 0.05)[0][1]
-    gain = PathGain(path, exact.table(50.0), 11.0, 1.0)
+    gain = gain_of(Transmitter(index, "small_slope", False).paths(np.array([550.0]), 0.05)[0][1])
     critical = np.arcsin(1.0 / index)
     cos_o = np.cos(np.linspace(critical - 0.05, critical + 0.05, 41))
     cos_i, row = np.array([np.cos(1.1)]), np.zeros(41, int)

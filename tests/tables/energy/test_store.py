@@ -12,9 +12,9 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+from mitsuba_diffraction.tables.energy.settings import EnergySettings
 from mitsuba_diffraction.tables.store import VARIABLE
-from tests.support.coarse import COARSE
+from tests.support.coarse import COARSE, energy_as
 
 
 @pytest.fixture
@@ -106,24 +106,13 @@ def test_another_coat_light_or_use_beneath_is_another_record(computed):
 
 def test_other_settings_are_another_record(computed):
     energy().at(1.0)
-    before = use_energy_settings(EnergySettings(target=0.9))
-    try:
+    with energy_as(EnergySettings(target=0.9)):
         energy().at(1.0)
-    finally:
-        use_energy_settings(before)
     energy().at(1.0)
     assert len(computed) == 2
 
 
-def test_what_a_table_keeps_for_the_next_material_changes_no_values():
-    before = use_energy_settings(COARSE)
-    try:
-        assert_albedos_are_those_of_new_tables()
-    finally:
-        use_energy_settings(before)
-
-
-def assert_albedos_are_those_of_new_tables() -> None:
+def test_what_a_table_keeps_for_the_next_material_changes_no_values() -> None:
     table, light = energy().table, (400.0, 700.0)
 
     def albedo(of: md.DiffractionTable, index: complex, coat: float, scale: float) -> np.ndarray:
@@ -133,7 +122,8 @@ def assert_albedos_are_those_of_new_tables() -> None:
         return found.albedo.values
 
     seen = []
-    for asked in ((1.5, 1.0, 1.0), (0.5 + 5.0j, 1.0, 1.0), (1.5, 1.3, 1.0), (1.5, 1.0, 0.5)):
-        seen.append(albedo(table, *asked))
-        assert np.array_equal(seen[-1], albedo(energy().table, *asked))
+    with energy_as(COARSE):
+        for asked in ((1.5, 1.0, 1.0), (0.5 + 5.0j, 1.0, 1.0), (1.5, 1.3, 1.0), (1.5, 1.0, 0.5)):
+            seen.append(albedo(table, *asked))
+            assert np.array_equal(seen[-1], albedo(energy().table, *asked))
     assert not any(np.array_equal(seen[0], other) for other in seen[1:])

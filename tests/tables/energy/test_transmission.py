@@ -8,7 +8,8 @@ import pytest
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Transmitter
-from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+from mitsuba_diffraction.tables.energy.settings import EnergySettings
+from tests.support.coarse import energy_as
 from tests.support.directions import rough_patch
 
 #: Between nodes of angles and azimuths; at the critical angle from within lobes are half reflected.
@@ -21,9 +22,8 @@ KINDS = {"interface": False, "sheet": True}
 @pytest.fixture(autouse=True)
 def few_wavelengths():
     """One pair of wavelengths, at which the sums are taken: nothing lies between."""
-    before = use_energy_settings(EnergySettings(side_wavelengths=2, azimuthal=16))
-    yield
-    use_energy_settings(before)
+    with energy_as(EnergySettings(side_wavelengths=2, azimuthal=16)):
+        yield
 
 
 def flat() -> HeightField:
@@ -99,10 +99,11 @@ def test_a_gentle_sheet_sends_on_nearly_all_light():
 
 def test_steps_send_on_no_more_than_they_get():
     """Without a scale walls 0.3 µm high send on up to 1.05."""
-    use_energy_settings(EnergySettings(side_wavelengths=2, azimuthal=40))
     table = DiffractionTable.build(steps(), coherence_width=12.0, height_scale_max=2.4)
     surface = SurfaceEnergy(table, Transmitter(2.4, "small_slope", False))
-    scales, angles = surface.conservation((540.0, 540.0)), np.radians(np.arange(1.0, 80.0, 6.0))
+    with energy_as(EnergySettings(side_wavelengths=2, azimuthal=40)):
+        scales = surface.conservation((540.0, 540.0))
+    angles = np.radians(np.arange(1.0, 80.0, 6.0))
     raw, kept = surface.albedos(scales, angles, np.radians(np.arange(4.0, 360.0, 37.0)), 540.0)
     assert raw.max() > 1.05
     # as the fuzz asks of all surfaces
@@ -111,16 +112,16 @@ def test_steps_send_on_no_more_than_they_get():
 
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
 def test_light_just_beyond_the_critical_angle_is_no_more_than_comes_in(model):
-    """All of it is reflected there, and of a small window too much: 1.08 without a scale's jump."""
-    use_energy_settings(EnergySettings())
+    """All is reflected there, and of a small window too much: 1.08 by a scale of light within."""
     heights = 0.015 * (np.arange(32) % 8 < 4) * np.ones((32, 1))
     table = DiffractionTable.build(
         HeightField(heights, (0.0722, 0.1175)), coherence_width=0.5, height_scale_max=2.36
     )
-    surface = SurfaceEnergy(table, Transmitter(2.36, model, False))
-    scales, beyond = surface.conservation((466.0, 466.0)), np.linspace(0.1, 3.0, 8)
-    angles = np.arcsin(1.0 / 2.36) + np.radians(beyond)
-    _, kept = surface.albedos(scales, angles, np.radians([30.0, 100.0]), 466.0)
+    with energy_as(EnergySettings()):
+        surface = SurfaceEnergy(table, Transmitter(2.36, model, False))
+        scales, beyond = surface.conservation((466.0, 466.0)), np.linspace(0.1, 3.0, 8)
+        angles = np.arcsin(1.0 / 2.36) + np.radians(beyond)
+        _, kept = surface.albedos(scales, angles, np.radians([30.0, 100.0]), 466.0)
     assert kept[1].max() < 1.005  # as the fuzz asks of all surfaces
     assert kept[1].min() > 0.98
 
