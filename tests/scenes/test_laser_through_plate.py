@@ -14,7 +14,6 @@ WALL, HEIGHT = 22.0, 9.0
 
 
 @pytest.mark.parametrize(("incidence", "orders"), [(0.0, (-1, 0, 1)), (30.0, (-1, 0))])
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 @pytest.mark.usefixtures("some_variant")
 def test_orders_fall_where_the_equation_says(incidence: float, orders: tuple[int, ...]) -> None:
     import drjit as dr
