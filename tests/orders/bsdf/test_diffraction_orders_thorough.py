@@ -24,7 +24,6 @@ from tests.support.orders import (
     reference_light,
     thin_grating,
 )
-from tests.support.transmitting import OneSide
 from tests.support.variants import evaluate, interaction
 
 pytestmark = pytest.mark.thorough
@@ -120,8 +119,8 @@ def test_a_mirror_is_that_of_the_plugin_diffraction(some_variant):
 def test_the_density_is_that_of_the_samples(some_variant, name, theta, side):
     # a window of three periods: lobes that overlap, and wide enough for the histogram
     table = TABLES[name]
-    bsdf = OneSide(load(table, coherence_width=3.0 * table.period), side)
-    test = chi_square(bsdf, Case(None, theta, DISPERSED), samples=1 << 19)
+    bsdf = load(table, coherence_width=3.0 * table.period)
+    test = chi_square(bsdf, Case(None, theta, DISPERSED, side=side), samples=1 << 19)
     # 1 % for the cases of a table together; the numbers drawn are always the same
     assert test.run(0.01, 6 if name == "block" else 2, quiet=True), test.messages
 
