@@ -26,7 +26,7 @@ from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.coarse import coarse_energy
 from tests.support.command_line import Ran
 from tests.support.kernels import Called, called_objects, compile_quickly, transform_once
-from tests.support.variants import SOME, VARIANTS, obstacle, runs
+from tests.support.variants import SOME, VARIANTS, obstacle, use
 
 pytest_plugins = ["tests.support.processor_time"]
 
@@ -195,32 +195,19 @@ def working_variant(request: pytest.FixtureRequest) -> str:
 @pytest.fixture
 def variant(working_variant: str) -> str:
     """Every working variant in turn, set: another test may have set another."""
-    import mitsuba as mi
-
-    mi.set_variant(working_variant)
-    return working_variant
+    return use(working_variant)
 
 
 @pytest.fixture
 def some_variant() -> str:
     """The first working variant, set: for what does not depend on which it is."""
-    import mitsuba as mi
-
-    name = next((name for name in VARIANTS if obstacle(name) is None), None)
-    if name is None:
-        pytest.skip(f"none of {', '.join(VARIANTS)} runs on this machine")
-    mi.set_variant(name)
-    return name
+    return use(*VARIANTS)
 
 
 @pytest.fixture
 def spectral() -> None:
     """The variant llvm_ad_spectral, which commands that measure set by its name, set."""
-    import mitsuba as mi
-
-    if reason := obstacle("llvm_ad_spectral"):
-        pytest.skip(reason)
-    mi.set_variant("llvm_ad_spectral")
+    use("llvm_ad_spectral")
 
 
 @pytest.fixture
@@ -259,15 +246,10 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 @pytest.fixture(scope="module", params=SOME)
 def one_of_some(request: pytest.FixtureRequest) -> str:
     """Name of a variant: tests of a module follow in its order, a change takes 0.1 s."""
-    if not runs(request.param):
-        pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
-    return str(request.param)
+    return use(request.param)
 
 
 @pytest.fixture
 def every_variant(one_of_some: str) -> str:
     """A variant of each backend, way of colour and polarisation in turn, set."""
-    import mitsuba as mi
-
-    mi.set_variant(one_of_some)
-    return one_of_some
+    return use(one_of_some)

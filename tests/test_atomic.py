@@ -71,32 +71,30 @@ def test_a_long_name_leaves_room_for_the_temporary_one(tmp_path):
     assert target.read_text() == "whole"
 
 
-def test_a_target_that_a_program_holds_open_is_one_line_and_stays(tmp_path, monkeypatch):
-    """Windows refuses to replace an open file."""
+@pytest.mark.parametrize(
+    ("refusing", "error", "said"),
+    [
+        # Windows does not replace an open file
+        (
+            "replace",
+            PermissionError(13, "Access is denied"),
+            "Access is denied; close",
+        ),
+        # network file systems and some local ones tell of a full disk when the file is flushed
+        ("fsync", OSError(errno.ENOSPC, "No space left"), "No space left"),
+    ],
+)
+def test_what_is_refused_late_is_one_line_and_leaves_what_was_there(
+    tmp_path, monkeypatch, refusing, error, said
+):
     target = tmp_path / "a.txt"
     target.write_text("before")
 
     def refuse(*_: object) -> None:
-        raise PermissionError(13, "Access is denied")
+        raise error
 
-    monkeypatch.setattr(os, "replace", refuse)
-    denied = pytest.raises(DiffractionError, match="Access is denied; close the programs")
-    with denied, atomic_path(target) as path:
-        path.write_text("after")
-    assert target.read_text() == "before"
-    assert os.listdir(tmp_path) == ["a.txt"]
-
-
-def test_what_the_disk_refuses_late_leaves_what_was_there(tmp_path, monkeypatch):
-    """Network file systems and some local ones tell of a full disk when the file is flushed."""
-    target = tmp_path / "a.txt"
-    target.write_text("before")
-
-    def full(_: int) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(DiffractionError, match="No space left"), atomic_path(target) as path:
+    monkeypatch.setattr(os, refusing, refuse)
+    with pytest.raises(DiffractionError, match=said), atomic_path(target) as path:
         path.write_text("after")
     assert target.read_text() == "before"
     assert os.listdir(tmp_path) == ["a.txt"]

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mitsuba_diffraction
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.files import MESHES
@@ -171,11 +170,11 @@ def test_no_code_block_escapes():
 
 
 @pytest.mark.parametrize("page", ["ARCHITECTURE.md", "docs/extending.md"])
-def test_modules_that_it_names_exist(page):
-    modules = set(re.findall(r"[\w/]+\.py\b", PAGES[page]))
-    assert len(modules) > 5
-    folders = PACKAGE, ROOT
-    assert {name for name in modules if not any((f / name).is_file() for f in folders)} == set()
+def test_files_that_it_names_exist(page):
+    files = set(re.findall(r"\w[\w/]*\.(?:py|md)\b", PAGES[page]))
+    assert len(files) > 5
+    folders = PACKAGE, ROOT, ROOT / "docs"
+    assert {name for name in files if not any((f / name).is_file() for f in folders)} == set()
 
 
 @pytest.mark.parametrize(
@@ -229,8 +228,7 @@ FOREIGN = {'Plugin "diffraction" not found'}
 @pytest.fixture(scope="module")
 def source() -> str:
     """Code of the package, with literals that continue on the next line joined."""
-    files = sorted(Path(mitsuba_diffraction.__file__).parent.rglob("*.py"))
-    code = "".join(path.read_text(encoding="utf-8") for path in files)
+    code = "".join(path.read_text("utf-8") for path in sorted(PACKAGE.rglob("*.py")))
     return re.sub(r"[\"']\n\s*f?[\"']", "", code)
 
 

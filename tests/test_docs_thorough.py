@@ -1,7 +1,7 @@
 """What README, docs and notebooks show runs: examples in Python, and commands in their order.
 
 Commands run on small patches and pictures. Not run: the gallery's commands, whose scenes
-test_scenes_thorough.py renders; `make`, `pip` and `apt`, which set up what runs these tests;
+test_scenes.py renders; `make`, `pip` and `apt`, which set up what runs these tests;
 `view`, which opens a window; `tradeoff`, `compare`, `plan` and `solve --crossed`, which take long
 at their smallest, and are run smaller still by their own tests. `render --denoise` runs without it.
 test_docs.py checks what these would be given.
@@ -22,12 +22,7 @@ from mitsuba_diffraction.orders.solve import jobs
 from tests.support.commands import commands, run_page, small_clone, small_tree
 from tests.support.pages import PAGES, blocks
 
-pytestmark = [
-    pytest.mark.thorough,
-    # heights as coarse and steep as the stand-ins' are worth a warning
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("some_variant"),
-]
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("some_variant")]
 
 DENOISER = importlib.util.find_spec("pyoidn") is not None
 

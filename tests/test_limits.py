@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import resource
+import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -16,7 +18,7 @@ from mitsuba_diffraction import DiffractionError, limits
 from mitsuba_diffraction.files import read_text, readable_file
 from mitsuba_diffraction.scene import set_variant
 from tests.support import ROOT
-from tests.support.small_scenes import FILES
+from tests.support.small_files import FILES
 
 
 def test_security_lists_the_limits():
@@ -95,3 +97,24 @@ def test_a_large_measurement_is_no_bomb(tmp_path):
     limits.check_content(8 * limits.MOST_PIXELS, limits.MOST_PIXELS, "'scan.png'")
     with pytest.raises(DiffractionError, match="claim"):
         limits.check_content(8 * limits.MOST_PIXELS, os.path.getsize(__file__), "'scan.png'")
+
+
+# Importing Mitsuba takes 0.2 GB, and what a file may hold 0.5 GB, twice while it is copied
+MOST_BYTES = 1_500_000_000
+MOST_SECONDS = 20.0
+
+
+@pytest.mark.thorough
+def test_small_files_take_neither_memory_nor_time(tmp_path):
+    """All are read in one process, so that each peak is that of all files before as well."""
+    ran = subprocess.run(
+        [sys.executable, "-m", "tests.support.small_files", tmp_path, *FILES],
+        cwd=ROOT, capture_output=True, text=True, timeout=600, check=False,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr[-500:]
+    lines = [json.loads(line) for line in ran.stdout.splitlines() if line.startswith("{")]
+    assert [line["name"] for line in lines] == list(FILES)
+    for line in lines:
+        assert line["seconds"] < MOST_SECONDS, line
+        assert line["peak"] < MOST_BYTES, line
+        assert line["refusal"], line

@@ -20,6 +20,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import mitsuba_diffraction
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.errors import (
     DiffractionError,
@@ -32,7 +33,8 @@ from mitsuba_diffraction.extras import optional
 from mitsuba_diffraction.streams import own_program, without_chatter
 from tests.support import ROOT
 from tests.support.directions import rough_patch
-from tests.support.docstrings import PACKAGE
+
+PACKAGE = Path(mitsuba_diffraction.__file__).parent
 
 
 def test_what_lies_between_two_quotations_is_not_cut():
@@ -84,7 +86,7 @@ def test_a_warning_is_one_line_of_its_own_kind():
 
 
 def test_the_package_warns_through_one_function():
-    for file in Path(PACKAGE).rglob("*.py"):
+    for file in PACKAGE.rglob("*.py"):
         if file.name != "errors.py":
             assert "warnings.warn(" not in file.read_text("utf-8"), file
 

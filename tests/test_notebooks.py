@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from pathlib import Path
+from typing import Any
 
 import nbformat
+import numpy as np
 import pytest
 
-from docs.make.figures.notebooks import main
-from tests.support.notebooks import (
-    NOTEBOOKS,
-    SAYS,
-    SMALLER,
-    kinds,
-    read,
-    streams,
-)
+from docs.make.figures.notebooks import execute, main
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.heights import gratings
+from tests.support import ROOT
+from tests.support.instruments import nanoscope
+from tests.support.variants import obstacle
 
 pytestmark = [
     # the kernel's messages pass between two processes of this machine
@@ -24,9 +24,86 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::RuntimeWarning:(zmq|jupyter_client|nbclient)"),
 ]
 
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+
+
+def read(path: Path) -> Any:
+    """A notebook as it is kept."""
+    return nbformat.read(path, as_version=4)
+
+
+def code(notebook: Any) -> str:
+    """The source of all its cells of code."""
+    return "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
+
+
+def streams(notebook: Any, name: str) -> str:
+    """Everything that its cells write to stdout or stderr."""
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    return "".join(output.text for output in outputs if output.get("name") == name)
+
+
+def kinds(notebook: Any) -> list[list[tuple[str, ...]]]:
+    """What each of its cells shows: which streams, pictures and values, not what is in them.
+
+    A stream counts once however many pieces it comes in: a slow machine's come in more.
+    """
+    cells = [
+        [(o.output_type, o.get("name", ""), *sorted(o.get("data", ()))) for o in cell.outputs]
+        for cell in notebook.cells
+        if cell.cell_type == "code"
+    ]
+    return [
+        [kind for n, kind in enumerate(cell) if kind[0] != "stream" or kind not in cell[n - 1 : n]]
+        for cell in cells
+    ]
+
+
+def hindrance(notebook: Any) -> str | None:
+    """Why a notebook cannot run on this machine, or None if it can."""
+    source = code(notebook)
+    for variant in re.findall(r"set_variant\(\"(\w+)\"\)", source):
+        if reason := obstacle(variant):
+            return reason
+    if "SurfaceTopography" in source and not importlib.util.find_spec("SurfaceTopography"):
+        return "SurfaceTopography (extra afm) is not installed"
+    return None
+
+
+#: What takes long and changes nothing that is tested, and what stands for it here.
+SMALLER = {
+    "first_render": {
+        "phi=0, resolution=150)": "phi=0, resolution=150, step=20)",
+        "--resolution 150 -o": "--resolution 150 --step 20 -o",
+        "extent=13, pixels=256": "extent=13, pixels=128",
+        '"sample_count": 49': '"sample_count": 16',
+        "resolution=100, step=10": "resolution=40, step=40",
+    },
+    "from_scan_to_bsdf": {"resolution=100, step=10": "resolution=40, step=40"},
+    # rows are alike: fewer have the same mean
+    "recover_grating_depth": {'"height": 32': '"height": 10'},
+}
+
+
+def smaller(path: Path, folder: Path) -> Path:
+    """A copy of a notebook with fewer samples, depths and rounds, and energy conserved coarsely."""
+    notebook = read(path)
+    for old, new in SMALLER.get(path.stem, {}).items():
+        assert old in code(notebook), old
+        for cell in notebook.cells:
+            cell.source = cell.source.replace(old, new)
+    first = next(cell for cell in notebook.cells if cell.cell_type == "code")
+    first.source = (
+        "from tests.support.coarse import coarse_energy\n"
+        "from tests.support.kernels import compile_quickly\n"
+        f"coarse_energy()\ncompile_quickly()\n{first.source}"
+    )
+    nbformat.write(notebook, folder / path.name)
+    return folder / path.name
+
 
 def test_there_are_notebooks():
-    assert {path.stem for path in NOTEBOOKS} >= {*SAYS, *SMALLER}
+    assert {path.stem for path in NOTEBOOKS} >= set(SMALLER)
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
@@ -71,3 +148,54 @@ def test_what_is_no_notebook_is_one_clear_line(tmp_path, capsys):
         assert main([str(path)]) == 1
         (line,) = capsys.readouterr().err.strip().splitlines()
         assert f"'{path}' is not a notebook that can be read" in line
+
+
+#: Run by `make notebooks` alone: half of all the notebooks' time, and their calls have tests.
+LONG = "shaders_against_path_tracing", "solved_orders", "speed_and_accuracy"
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "path", [path for path in NOTEBOOKS if path.stem not in LONG], ids=lambda path: path.stem
+)
+def test_it_runs_without_a_warning_and_keeps_its_promises(path, tmp_path):
+    before = read(path)
+    if reason := hindrance(before):
+        pytest.skip(reason)
+    try:
+        now = execute(smaller(path, tmp_path))
+    except DiffractionError as error:
+        if "no OpenGL without a window" not in str(error):
+            raise
+        pytest.skip(str(error))
+    # what a notebook teaches should not need excuses
+    assert streams(now, "stderr") == ""
+    # whoever only reads it sees what it shows
+    assert kinds(now) == kinds(before)
+    # its cells hold their results against what the text says
+    assert re.search(r"^\s*(assert |np\.testing\.assert_)", code(now), re.M)
+
+
+@pytest.mark.thorough
+def test_another_scan_takes_one_line(tmp_path):
+    """From a NanoScope file to a table, by the notebook that makes a scan of its own."""
+    pytest.importorskip("SurfaceTopography", reason="instrument files need the extra afm")
+    notebook = read(ROOT / "notebooks" / "from_scan_to_bsdf.ipynb")
+    if reason := hindrance(notebook):
+        pytest.skip(reason)
+    heights = gratings.elaphe_like(extent=6.0, pixels=96, depth=0.04).heights
+    counts = np.round((heights - 0.02) * 1e6).astype(np.int16)
+    (tmp_path / "scan.spm").write_bytes(nanoscope(counts, scan_size="6 6 ~m"))
+    # what comes after the table takes the table
+    end = next(
+        n for n, c in enumerate(notebook.cells) if "## What the treatment changed" in c.source
+    )
+    del notebook.cells[end:]
+    own = 'SCAN = folder / "practice.gwy"'
+    (cell,) = [cell for cell in notebook.cells if cell.source.startswith(own)]
+    cell.source = cell.source.replace(own, 'SCAN = "scan.spm"', 1)
+    nbformat.write(notebook, tmp_path / "own.ipynb")
+    now = execute(tmp_path / "own.ipynb")
+    assert streams(now, "stderr") == ""
+    assert "HeightField('scan.spm', 96 x 96 pixels of 0.0625 x 0.0625 µm" in streams(now, "stdout")
+    assert "from the true heights" not in streams(now, "stdout")

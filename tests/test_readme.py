@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import mitsuba as mi
@@ -11,16 +10,9 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
-from tests.support.pages import PAGES
+from tests.support.pages import PAGES, blocks
 
 README = PAGES["README.md"]
-
-
-def block(language: str) -> str:
-    """The first code block of that language."""
-    found = re.search(rf"```{language}\n(.*?)```", README, re.S)
-    assert found, language
-    return found[1]
 
 
 @pytest.fixture(autouse=True)
@@ -31,19 +23,18 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_python_example_makes_a_picture():
     # Mitsuba writes in the background and only waits for it at exit
-    exec(block("python").replace("spp=32)", "spp=1), write_async=False"), {})
+    exec(blocks("README.md", "python")[0].replace("spp=32)", "spp=1), write_async=False"), {})
     with Image.open("ball.png") as picture:
         assert np.ptp(np.asarray(picture.convert("L"))) > 0
 
 
-# the example's smooth heights are far from what its pixel size would resolve
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 def test_xml_example_loads():
     mi.set_variant("llvm_ad_spectral")
     x = np.arange(64)
     rows = np.tile(np.uint8(127 + 127 * np.sin(2 * np.pi * x / 32)), (64, 1))
     Image.fromarray(rows).save("scale.png")
-    Path("scene.xml").write_text(f'<scene version="3.0.0">{block("xml")}</scene>', encoding="utf-8")
+    (xml,) = blocks("README.md", "xml")
+    Path("scene.xml").write_text(f'<scene version="3.0.0">{xml}</scene>', encoding="utf-8")
     scene = mi.load_file("scene.xml")
     assert "Diffraction" in str(scene.shapes()[0].bsdf())
 

@@ -10,11 +10,7 @@ from mitsuba_diffraction.files import FileKind, kind_of
 from mitsuba_diffraction.heights import Recipe
 from mitsuba_diffraction.scene.parameters import check_parameters, parameters_of
 from tests.support.scenes import SCENES, SMALL, rendered
-
-# the look-alikes are as steep as the real scales, which the package says every time
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-]
+from tests.support.variants import use
 
 SOLVED = (
     "cd", "cd_window", "grating", "grating_window", "laser_through_plate", "orders_on_wall",
@@ -136,3 +132,73 @@ def test_the_sun_stands_where_the_angles_say(azimuth: float, elevation: float) -
 def test_a_patch_of_the_user_replaces_the_default(gentle: dict[str, str]) -> None:
     own = {name: gentle[name] for name in ("patch", "pixel_size")}
     assert np.isfinite(rendered("plate", **own)).all()
+
+
+@pytest.mark.parametrize("name", ["plate", "sphere", "snake", "xenopeltis"])
+@pytest.mark.usefixtures("variant")
+@pytest.mark.thorough
+def test_it_renders_at_its_defaults(name: str) -> None:
+    image = rendered(name)
+    assert image.shape == (40, 48, 3)
+    assert np.isfinite(image).all()
+    # shown as it is: neither black nor burnt out
+    assert 0.02 < np.median(image.mean(axis=2)) < 0.8
+
+
+OWN = {"patch": "{patch}", "pixel_size": "{pixel_size}"}
+TRACKS = "{patch},pixel_size={pixel_size},coherence_width={coherence_width},material=Al"
+#: Scenes, and parameters that take those of the gentle patch.
+SMALL_SCENES = [
+    *((name, OWN) for name in ("film", "hologram", "scales_macro")),
+    ("snake", OWN | {"skin": "skin_two.xml", "second_patch": "{patch}"}),
+]
+#: The same where no kernel is compiled, which is quicker for few samples.
+WITHOUT_KERNELS = [
+    *((name, {}) for name in ("cd", "cd_window", "grating", "grating_window", "spectrometer")),
+    ("material_ball", OWN),
+    ("scales", OWN),
+    ("cd", {"material:tracks": TRACKS}),
+]
+
+
+@pytest.mark.parametrize(
+    ("variant", "name", "given"),
+    [("llvm_ad_spectral", *case) for case in SMALL_SCENES]
+    + [("scalar_spectral", *case) for case in WITHOUT_KERNELS],
+)
+@pytest.mark.thorough
+def test_it_renders_small(
+    variant: str, name: str, given: dict[str, str], gentle: dict[str, str]
+) -> None:
+    use(variant)
+    own = {key: value.format(**gentle) for key, value in given.items()}
+    image = rendered(name, spp="2", resx="12", resy="10", **own)
+    assert image.shape == (10, 12, 3)
+    assert np.isfinite(image).all()
+    assert image.max() > 0.0
+
+
+@pytest.mark.usefixtures("variant")
+@pytest.mark.thorough
+def test_the_snake_fills_half_of_the_picture() -> None:
+    import mitsuba as mi
+
+    scene = mi.load_file(str(SCENES / "snake.xml"), **SMALL)
+    depth = mi.load_dict({"type": "aov", "aovs": "shape:shape_index"})
+    index = np.array(mi.render(scene, integrator=depth, spp=4))[..., 0]
+    ground = [shape.id() for shape in scene.shapes()].index("ground")
+    assert (np.abs(index - ground) > 0.5).mean() > 0.5
+
+
+@pytest.mark.usefixtures("variant")
+@pytest.mark.thorough
+def test_colours_move_with_the_lamp() -> None:
+    """Turning the lamp by some degrees moves another part of the spectrum over the plate."""
+    more = {"spp": "32", "lamp_radius": "3"}
+    middle = slice(14, 26), slice(14, 34)
+    blue, red = (
+        rendered("plate", lamp_azimuth=azimuth, **more)[middle].mean(axis=(0, 1))
+        for azimuth in ("54", "46")
+    )
+    # the orders lie across the plate, blue nearest to the mirror direction
+    assert blue[2] / blue[0] > 1.3 * red[2] / red[0]

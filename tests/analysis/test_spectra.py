@@ -21,7 +21,7 @@ from mitsuba_diffraction.analysis.spectra_files import (
 )
 from mitsuba_diffraction.analysis.spectrometer import STEEPEST, MeasurementGeometry
 from tests.support.directions import Array, polar, rough_patch
-from tests.support.variants import obstacle
+from tests.support.variants import use
 
 LAM = np.array([420.0, 500.0, 580.0, 660.0])
 FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
@@ -31,10 +31,7 @@ FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
     scope="module", params=["llvm_ad_spectral", "llvm_ad_spectral_polarized"], autouse=True
 )
 def variant(request):
-    if reason := obstacle(request.param):
-        pytest.skip(reason)
-    mi.set_variant(request.param)
-    return request.param
+    return use(request.param)
 
 
 def load(field, **parameters):

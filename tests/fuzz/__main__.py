@@ -14,36 +14,40 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from mitsuba_diffraction.streams import own_program
 from tests.fuzz import command_lines, damage, energy, orders, surfaces
 
-KINDS: dict[str, Callable[[np.random.Generator], None]] = {
-    "tables": damage.check_table,
-    "documents": damage.check_document,
-    "heights": damage.check_heights,
-    "texts": damage.check_text,
-    "commands": command_lines.check,
-    "surfaces": surfaces.check,
-    "scenes": damage.check_scene,
-    "orders": orders.check,
-    "energy": energy.check,
+
+class Kind(NamedTuple):
+    """A kind of cases: what checks one, and the number that decides its random numbers.
+
+    Attributes
+    ----------
+    round : cases that take about a second together.
+    share : of the time, relative to others.
+    """
+
+    check: Callable[[np.random.Generator], None]
+    stream: int
+    round: int
+    share: float = 1.0
+
+
+KINDS = {
+    "tables": Kind(damage.check_table, 3, 30),
+    "documents": Kind(damage.check_document, 5, 50),
+    "heights": Kind(damage.check_heights, 1, 20),
+    "texts": Kind(damage.check_text, 4, 30),
+    "commands": Kind(command_lines.check, 0, 10),
+    "surfaces": Kind(surfaces.check, 2, 2),
+    "scenes": Kind(damage.check_scene, 7, 20),
+    "orders": Kind(orders.check, 10, 30),
+    "energy": Kind(energy.check, 11, 1, share=2.0),
 }
-#: A kind's number decides its random numbers: new ones go to the end.
-_STREAMS = {
-    "commands": 0, "heights": 1, "surfaces": 2, "tables": 3, "texts": 4, "documents": 5,
-    "scenes": 7, "orders": 10, "energy": 11,
-}  # fmt: skip
-#: Share of the time that each kind gets.
-_SHARES = {
-    "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.1, "scenes": 0.1,
-    "commands": 0.1, "surfaces": 0.1, "orders": 0.1, "energy": 0.2,
-}  # fmt: skip
-#: Cases of each kind that take about a second together.
-ROUND = {"tables": 30, "documents": 50, "heights": 20, "texts": 30, "commands": 10, "surfaces": 2}
-ROUND |= {"scenes": 20, "orders": 30, "energy": 1}
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
 #: less than one, and some where kernels are compiled on a slow machine. Scales of energy of a thick
 #: film whose lengths vary take a minute.
@@ -59,10 +63,10 @@ def run_case(kind: str, seed: int, number: int) -> None:
     AssertionError
         Or whatever else the case raises, if it fails.
     """
-    rng = np.random.default_rng([seed, _STREAMS[kind], number])
+    rng = np.random.default_rng([seed, KINDS[kind].stream, number])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        KINDS[kind](rng)
+        KINDS[kind].check(rng)
 
 
 def main() -> int:
@@ -144,7 +148,7 @@ def _timed(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, in
     spent = dict.fromkeys(kinds, 0.0)
     number = dict.fromkeys(kinds, args.worker)
     while (begin := time.monotonic()) - start < args.seconds:
-        kind = min(kinds, key=lambda k: spent[k] / _SHARES[k])
+        kind = min(kinds, key=lambda k: spent[k] / KINDS[k].share)
         yield kind, number[kind]
         spent[kind] += time.monotonic() - begin
         number[kind] += args.jobs
@@ -153,7 +157,7 @@ def _timed(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, in
 def _counted(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, int]]:
     """Yield a worker's cases of `--rounds`: the same on every machine, however fast."""
     for kind in kinds:
-        for number in range(args.worker, args.rounds * ROUND[kind], args.jobs):
+        for number in range(args.worker, args.rounds * KINDS[kind].round, args.jobs):
             yield kind, number
 
 

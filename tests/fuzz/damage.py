@@ -218,9 +218,16 @@ def check_scene(rng: np.random.Generator) -> None:
 
 def _check(rng: np.random.Generator, names: list[str], use: Callable[[Path], object]) -> None:
     name = names[rng.integers(len(names))]
+    check_damaged(rng, name, originals()[name], use)
+
+
+def check_damaged(
+    rng: np.random.Generator, name: str, content: bytes, use: Callable[[Path], object]
+) -> None:
+    """Damage a file: it is refused in one line, or can be used."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, name)
-        path.write_bytes(damaged(rng, originals()[name]))
+        path.write_bytes(damaged(rng, content))
         try:
             use(path)
         except md.DiffractionError as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import tempfile
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from scipy.io import netcdf_file
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders.solve import SolvedRecipe
 from mitsuba_diffraction.orders.solve.profiles import read_profile
-from tests.fuzz.damage import check_line, damaged
+from tests.fuzz.damage import check_damaged
 from tests.support.orders import thin_grating
 
 _RECIPE = """method = "solved"
@@ -77,14 +76,7 @@ _USES: dict[str, Callable[[Path], object]] = {
 def check(rng: np.random.Generator) -> None:
     """A file is refused in one line, or can be used."""
     name = str(rng.choice(sorted(_USES)))
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        path = Path(folder, name)
-        path.write_bytes(damaged(rng, originals()[name]))
-        try:
-            _USES[name](path)
-        except md.DiffractionError as error:
-            check_line(error)
+    check_damaged(rng, name, originals()[name], _USES[name])
 
 
 def _look_up(table: md.OrderTable) -> None:

@@ -29,13 +29,6 @@ def test_a_white_surface_has_y_1_and_is_white(illuminant):
     np.testing.assert_allclose(linear_srgb(xyz, illuminant), 1.0, atol=5e-4)
 
 
-@pytest.mark.parametrize(("illuminant", "x", "y"), [("D65", 0.31272, 0.32903), ("E", 1 / 3, 1 / 3)])
-def test_the_white_points_are_the_published_ones(illuminant, x, y):
-    xyz = response(EVERY_NM, illuminant).sum(axis=0)
-    # CIE 15:2004, table T.3; the observer's own sums are 1/3 to within 5e-5
-    np.testing.assert_allclose(xyz[:2] / xyz.sum(), (x, y), atol=5e-5)
-
-
 @pytest.mark.parametrize("illuminant", ILLUMINANTS)
 def test_the_tables_are_those_of_colour_science(illuminant):
     name = "CIE 1931 2 Degree Standard Observer"
@@ -49,13 +42,8 @@ def test_the_tables_are_those_of_colour_science(illuminant):
     np.testing.assert_allclose(linear_srgb(np.eye(3), illuminant), matrix, atol=1e-15)
 
 
-def test_the_observer_is_brightest_at_555_nm_and_blind_beyond_the_visible():
-    assert EVERY_NM[response(EVERY_NM, "E")[:, 1].argmax()] == 555
+def test_the_observer_is_blind_beyond_the_visible():
     np.testing.assert_array_equal(response([359.9, 830.1, 100.0, 2000.0]), 0.0)
-
-
-def test_monochromatic_light_is_outside_the_gamut_and_stays_there():
-    assert linear_srgb(response(500.0)).min() < 0
 
 
 def test_the_wavelengths_of_rgb_are_the_means_of_its_channels():

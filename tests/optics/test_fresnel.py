@@ -15,19 +15,6 @@ FILMS = (1.45, 0.7, 2.4 + 0.1j)
 DEPTHS = np.random.default_rng(4).uniform(0.1, 6.0, 300)
 
 
-@pytest.mark.parametrize("index", [1.5, 1.0 + 6.8j, 0.05 + 4.2j])
-def test_at_normal_incidence(index):
-    expected = abs((index - 1) / (index + 1)) ** 2
-    assert fresnel.reflectance(1.0, index) == pytest.approx(expected, rel=1e-14)  # rounding
-
-
-def test_at_brewster_s_angle_only_te_is_reflected():
-    n = 1.5
-    cosine = 1 / np.sqrt(1 + n * n)
-    te = ((n * n - 1) / (n * n + 1)) ** 2
-    assert fresnel.reflectance(cosine, n) == pytest.approx(0.5 * te, rel=1e-12)  # rounding
-
-
 def test_a_perfect_conductor_reflects_everything():
     assert np.all(fresnel.reflectance(COSINES, np.inf) == 1.0)
 
@@ -46,20 +33,6 @@ def test_it_is_what_mitsuba_computes(some_variant):
         values = np.array([np.array(value).item() for value in theirs])
         # Mitsuba's single precision
         assert fresnel.reflectance(cosine, n) == pytest.approx(values, abs=2e-6)
-
-
-@pytest.mark.parametrize("index", MATERIALS)
-@pytest.mark.parametrize("film", FILMS)
-def test_flat_films_are_those_of_transfer_matrices(index, film):
-    tmm = pytest.importorskip("tmm", reason="the extra `validation` has tmm")
-    for theta, thickness in ((0.0, 80.0), (40.0, 300.0), (80.0, 900.0)):
-        angle, wavelength = np.radians(theta), 550.0
-        depth = 2 * np.pi * thickness / wavelength
-        mine = fresnel.amplitudes(np.cos(angle), Filmed(index, film, depth))
-        for light, r in zip("sp", mine, strict=True):
-            stack = [1.0, film, index], [np.inf, thickness, np.inf]
-            theirs = tmm.coh_tmm(light, *stack, angle, wavelength)
-            assert abs(r) ** 2 == pytest.approx(theirs["R"], abs=1e-12)
 
 
 @pytest.mark.parametrize("index", MATERIALS)

@@ -40,12 +40,6 @@ def test_a_mirror_s_directions_cancel_in_the_plane():
     assert w == pytest.approx(2 * np.cos(np.radians(40)), rel=1e-15)
 
 
-def test_at_normal_incidence_and_reflection_only_the_window_is_left():
-    # (1 + 1)² / (λ² πσ² 2² · 1 · 1)
-    factor = kirchhoff_factor(polar(0), polar(0), 500.0, 2.0)
-    assert factor == pytest.approx(1 / (0.5**2 * np.pi * 4.0), rel=1e-15)  # rounding
-
-
 @given(angles, angles, st.floats(360.0, 830.0))
 def test_the_factor_is_positive_symmetric_and_as_written(incident, outgoing, lam):
     wi, wo = polar(*incident), polar(*outgoing)

@@ -44,11 +44,13 @@ def test_reflection_is_that_of_transfer_matrices():
             assert [r_s[n, m], r_p[n, m]] == pytest.approx(r, abs=1e-9)
 
 
-def test_one_layer_is_a_film():
-    got = amplitudes(COSINES, LAM, INDICES[:2], THICK[:1])
+@pytest.mark.parametrize("film", [1.45, 0.7, 2.4 + 0.1j])
+@pytest.mark.parametrize("index", [1.5, 0.8, 0.65 + 5.6j])
+def test_one_layer_is_a_film(index, film):
+    got = amplitudes(COSINES, LAM, np.outer([index, film], np.ones(3)), THICK[:1])
     for n, lam in enumerate(LAM):
-        film = Filmed(INDICES[0, n], INDICES[1, n], 2 * np.pi * THICK[0] / lam)
-        expected = reference.fresnel.amplitudes(COSINES, film)
+        filmed = Filmed(index, film, 2 * np.pi * THICK[0] / lam)
+        expected = reference.fresnel.amplitudes(COSINES, filmed)
         np.testing.assert_allclose([part[n] for part in got], expected, atol=1e-12)
 
 

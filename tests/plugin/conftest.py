@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import drjit as dr
-import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction.tables.energy.settings import use_energy_settings
 from tests.support.coarse import coarse_energy
+from tests.support.variants import use
 
 
 @pytest.fixture
@@ -23,6 +22,4 @@ def coarsely() -> Iterator[None]:
 @pytest.fixture
 def mono() -> None:
     """A variant of one wavelength, for short kernels."""
-    if not dr.has_backend(dr.JitBackend.LLVM):
-        pytest.skip("Dr.Jit finds no LLVM")
-    mi.set_variant("llvm_ad_mono")
+    use("llvm_ad_mono")

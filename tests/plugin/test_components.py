@@ -165,13 +165,6 @@ def test_types_are_sampled_as_they_are_evaluated_and_add_up():
     assert sampled(bsdf, delta).delta > 0.01
 
 
-def test_a_white_mirror_beneath_returns_what_the_interface_leaves_it():
-    bsdf = surface(beneath=REFLECTING["conductor"])
-    found = sampled(bsdf, asked(None))
-    # R twice through, R once: what the interface reflects inwards is lost
-    assert 0.94 < found.spread + found.delta < 1.0
-
-
 @pytest.mark.parametrize("name", TRANSMITTING)
 def test_what_transmits_is_refused_beneath(name):
     said = refusal(lambda: surface(beneath=TRANSMITTING[name]))

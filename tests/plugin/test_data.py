@@ -15,7 +15,8 @@ from tests.support.directions import Array, rough_patch
 from tests.support.kinds import KINDS, MIX, THROUGH, lit, made
 from tests.support.lanes import interaction, spectra, vectors
 from tests.support.layered import PATCH, load
-from tests.support.variants import runs
+from tests.support.plates import plate, rendered, scene
+from tests.support.variants import use
 
 OTHER = rough_patch((40, 44), (0.09, 0.09), 0.2, 0.6, seed=3)
 #: As Mitsuba's arrays hold them.
@@ -62,18 +63,10 @@ def test_changed_heights_leave_no_files(some_variant, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "scalar_spectral"])
 def test_albedo_and_pictures_follow_heights(variant):
-    if not runs(variant):
-        pytest.skip(f"{variant} is not here")
-    mi.set_variant(variant)
+    use(variant)
 
     def picture(bsdf: Any) -> Array:
-        plate = {"type": "rectangle", "bsdf": bsdf}
-        scene = {"type": "scene", "plate": plate, "light": {"type": "constant"}}
-        film = {"type": "hdrfilm", "width": 2, "height": 2, "rfilter": {"type": "box"}}
-        to = mi.ScalarTransform4f().look_at([0, 1, 2], [0, 0, 0], [0, 1, 0])
-        scene["camera"] = {"type": "perspective", "to_world": to, "fov": 10, "film": film}
-        scene["integrator"] = {"type": "direct"}
-        return np.array(mi.render(mi.load_dict(scene), spp=4, seed=1))
+        return rendered(scene(plate(bsdf), size=2), 4)
 
     conserving = {"material": "Al", "energy_conserving": True, "tolerance": 1e-3}
     bsdf = load(**conserving)

@@ -11,8 +11,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.support.directions import rough_patch
-from tests.support.gentle import PATCH, UV, WIDTH, bitmap, hits, pairs
-from tests.support.lanes import interaction, refusal, spectra, vectors
+from tests.support.gentle import PATCH, UV, WIDTH, hits, pairs
+from tests.support.lanes import bitmap, interaction, refusal, spectra, vectors
 from tests.support.variants import evaluate
 
 OTHER = rough_patch((60, 60), (0.08, 0.08), 0.1, seed=3)
@@ -143,14 +143,10 @@ def test_light_is_interpolated_between_the_nearest_depths(every_variant, depth):
 
 def test_a_texture_varies_the_depth(variant):
     depths = np.array([[0.12, 0.31], [0.2, 0.4]], np.float32)
-    texture = {"type": "bitmap", "raw": True, "filter_type": "nearest",
-               "data": mi.TensorXf(depths[..., None])}  # fmt: skip
-    uv = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]])
     wi = np.array([[0.0, 0.2, np.sqrt(0.96)]] * 4)
-    si = interaction(wi, np.full((4, 4), 550.0))
-    si.uv = mi.Point2f(uv.T)
+    si = hits(wi, UV)
     wo = mi.Vector3f((wi * [-1.0, -1.0, 1.0]).T)
-    found = np.array(at_depth(texture).eval(mi.BSDFContext(), si, wo))[0]
+    found = np.array(at_depth(bitmap(depths)).eval(mi.BSDFContext(), si, wo))[0]
     whole = np.array(mi.load_dict(grating(0.1, 1.0)).eval(mi.BSDFContext(), si, wo))[0]
     assert found / whole == pytest.approx(reflectance_at(depths.ravel()), rel=2e-3)
 
@@ -182,15 +178,9 @@ def test_the_depth_changes(variant):
 
 def test_weights_are_shares_of_their_sum_and_components_follow_each_other():
     mi.set_variant("scalar_spectral_polarized")
-    white = {
-        "type": "bitmap",
-        "raw": True,
-        "data": mi.TensorXf(np.full((2, 2, 1), 0.2, np.float32)),
-    }
-    mix = mi.load_dict(
-        {"type": "diffraction_mix", "first": {"type": "plastic"}, "weight_first": white,
-         "second": {"type": "diffuse"}, "weight_second": 0.3}
-    )  # fmt: skip
+    first = {"first": {"type": "plastic"}, "weight_first": bitmap(np.full((2, 2), 0.2))}
+    second = {"second": {"type": "diffuse"}, "weight_second": 0.3}
+    mix = mi.load_dict({"type": "diffraction_mix", **first, **second})
     si = mi.SurfaceInteraction3f()
     si.wi = mi.Vector3f(0.0, 0.6, 0.8)
     assert mix.weights.at(si, True) == pytest.approx([0.4, 0.6])

@@ -13,10 +13,7 @@ from tests.support.directions import as_single, polar, rough_patch
 from tests.support.gentle import load
 from tests.support.lanes import evaluated
 
-pytestmark = [
-    pytest.mark.thorough,
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
-]
+pytestmark = pytest.mark.thorough
 
 
 def deep(depth: float, shape=(12, 12), pixels=(0.1, 0.1), offset: float = 0.0) -> HeightField:

@@ -13,10 +13,10 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import Filmed
-from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import as_single, polar
-from tests.support.lanes import evaluated, interaction, refusal
+from tests.support.furnace import furnace_in, sent_on
+from tests.support.lanes import bitmap, evaluated, refusal
 from tests.support.layered import FLAT, PATCH, WIDTH, load, pairs
 from tests.support.variants import evaluate
 
@@ -51,23 +51,16 @@ def film_colour(thickness: float) -> Any:
 
 
 @pytest.mark.parametrize("thickness", [0.0, 100.0, 300.0, 1000.0, 4000.0])
-def test_a_few_wavelengths_make_a_film_s_colour(some_variant, thickness):
-    found = Channels.of(2 * 1.45 * thickness)
-    index = Filmed(0.9 + 6.0j, 1.45, 2 * np.pi * thickness / np.array(found.wavelengths))
-    powers = reflectance(np.cos(np.radians(30.0)), index)
-    # what lies beyond the ends is left out, and a spline is through four points a fringe
-    assert np.array(found.weights) @ powers == pytest.approx(film_colour(thickness), abs=5e-3)
-
-
-def test_in_rgb_a_mirror_has_the_film_s_colour():
+def test_in_rgb_a_mirror_has_the_film_s_colour(thickness):
     mi.set_variant("scalar_rgb")
     wi = as_single(polar(30.0))[None]
     samples, lam = np.full((1, 3), 0.5), np.full((1, 4), 550.0)
     filmed, mirror = (
         evaluate(load(FLAT, **p), wi, as_single(wi * [-1, -1, 1]), samples, lam)[0][0]
-        for p in (METAL | {"film_ior": 1.45, "film_thickness": 300.0}, {"material": "none"})
+        for p in (METAL | {"film_ior": 1.45, "film_thickness": thickness}, {"material": "none"})
     )
-    assert filmed / mirror == pytest.approx(film_colour(300.0), abs=5e-3)
+    # what lies beyond the ends is left out, and a spline is through four points a fringe
+    assert filmed / mirror == pytest.approx(film_colour(thickness), abs=5e-3)
 
 
 def under_film(cosine: Any) -> Any:
@@ -85,7 +78,6 @@ def under_coat(cosine: Any) -> Any:
 @pytest.mark.parametrize("theta", [0.0, 45.0])
 @pytest.mark.parametrize("passed", [under_film, under_coat])
 def test_over_white_it_returns_what_the_layer_lets_through(some_variant, passed, theta):
-    count = 1 << 14
     white = {"type": "diffuse", "reflectance": {"type": "spectrum", "value": 1.0}}
     if passed is under_coat:
         bsdf = load(FLAT, nested=white, int_ior=1.6, coat_ior=1.4, ext_ior=1.0)
@@ -93,10 +85,7 @@ def test_over_white_it_returns_what_the_layer_lets_through(some_variant, passed,
         flat = md.HeightField(np.zeros((300, 300)), 0.08)
         wide = {"coherence_width": 24.0, "energy_conserving": True}
         bsdf = load(flat, nested=white, film_ior=2.2, film_thickness=120.0, **wide, **GLASS)
-    si = interaction(np.tile(as_single(polar(theta)), (count, 1)), 550.0)
-    rng = mi.PCG32(count)
-    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    weights = np.array(bsdf.sample(mi.BSDFContext(), si, one, two)[1], float)[0]
+    weights = sent_on(bsdf, polar(theta)[None], 0, 550.0, samples=1 << 14)
     cosines = np.sqrt((np.arange(200) + 0.5) / 200)  # equal shares of ∫ cosθ dω
     there, back = (passed(c) for c in (np.cos(np.radians(theta)), cosines))
     expected = 1 - there + there * back.mean()
@@ -113,12 +102,9 @@ def test_a_table_that_does_not_reach_the_heights_under_a_coat_is_one_line(some_v
     assert "height_scale_max=1.58" in refusal(lambda: mi.load_dict({**plugin, "coat_ior": 1.58}))
 
 
-def shares(*values: float) -> dict[str, Any]:
-    """A texture of thicknesses along u, as shares; of as many texels as Mitsuba changes."""
-    pixels = np.broadcast_to(np.float32(values)[None, :, None], (2, max(len(values), 2), 1))
-    nearest = {"filter_type": "nearest", "wrap_mode": "clamp"}
-    return {"type": "bitmap", "bitmap": mi.Bitmap(np.ascontiguousarray(pixels)), "raw": True,
-            **nearest}  # fmt: skip
+def shares(value: float) -> dict[str, Any]:
+    """A texture of a thickness, as a share."""
+    return bitmap(np.full((2, 2), value))
 
 
 def of_share(value: float) -> Any:
@@ -150,32 +136,6 @@ def test_a_picture_s_name_stands_for_its_texture(some_variant, tmp_path):
     assert evaluated(named, wi, wo, lam) == pytest.approx(expected, rel=1e-4, abs=1e-7)
 
 
-def test_a_texture_s_derivative_is_that_of_differences(some_variant):
-    ends = {"film_thickness_min": 100.0, "film_thickness_max": 300.0}
-    bsdf = load(**METAL, film_ior=1.6, film_thickness=shares(0.5), **ends)
-    wi, wo, lam = pairs(40)
-    si, parameters = interaction(wi, lam), mi.traverse(bsdf)
-    out = mi.Vector3f(wo.T)
-
-    def values(share: float) -> Any:
-        parameters["film_thickness.data"] = of_share(share)
-        if share == 0.5:
-            dr.enable_grad(parameters["film_thickness.data"])
-        parameters.update()
-        return bsdf.eval(mi.BSDFContext(), si, out)
-
-    value = values(0.5)
-    dr.forward(parameters["film_thickness.data"])
-    derivative = np.array(dr.grad(value))
-    differences = (np.array(values(0.505)) - np.array(values(0.495))) / 0.01
-    assert np.abs(differences).max() > 0.0
-    # the step is 2 nm, over which a fringe bends by some 1e-3
-    assert np.abs(derivative - differences).sum() < 5e-3 * np.abs(differences).sum()
-    parameters["film_thickness.data"] = of_share(1.5)
-    with pytest.raises(md.DiffractionError, match="film_thickness: the texture's numbers"):
-        parameters.update()
-
-
 def test_no_thickness_of_a_texture_sends_on_more_light_than_it_gets(mono):
     grating = md.gratings.sinusoidal(1.6, 0.2, periods=1, pixels_per_period=24, rows=8)
     silver = {"eta": 0.05, "k": 4.0, "coherence_width": 8.0, "field": grating}
@@ -183,19 +143,13 @@ def test_no_thickness_of_a_texture_sends_on_more_light_than_it_gets(mono):
     film = {"film_ior": 1.4, "film_thickness_max": 300.0, "film_thickness": shares(0.5)}
     bsdf = load(energy_conserving=True, wavelength=550.0, **silver, **film)
     parameters, rng = mi.traverse(bsdf), np.random.default_rng(3)
-    directions = as_single([polar(theta) for theta in (30.0, 75.0, 82.0)])
-    si = interaction(np.repeat(directions, 1 << 14, axis=0), 550.0)
+    directions = np.array([polar(theta) for theta in (30.0, 75.0, 82.0)])
     for share in rng.uniform(0.0, 1.0, 6).tolist():
         parameters["film_thickness.data"] = of_share(share)
         parameters.update()
-        numbers = mi.PCG32(dr.width(si.wi))
-        one, two = (
-            numbers.next_float32(),
-            mi.Point2f(numbers.next_float32(), numbers.next_float32()),
-        )
-        weights = np.array(bsdf.sample(mi.BSDFContext(), si, one, two)[1], float)[0]
-        weights = weights.reshape(len(directions), -1)
-        error = 3 * weights.std(axis=1) / np.sqrt(weights.shape[1])
+        mean, error = furnace_in(bsdf, directions, 0)
         # linear between thicknesses, where a fringe bends: 1.02 at most of 24
-        assert np.all(weights.mean(axis=1) > 0.9)
-        assert np.all(weights.mean(axis=1) < 1.02 + error)
+        assert np.all((mean > 0.9) & (mean < 1.02 + 3 * error))
+    parameters["film_thickness.data"] = of_share(1.5)
+    with pytest.raises(md.DiffractionError, match="film_thickness: the texture's numbers"):
+        parameters.update()

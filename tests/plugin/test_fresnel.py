@@ -13,6 +13,7 @@ from mitsuba_diffraction.optics.fresnel import Filmed, normal_reflectance
 from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
 from mitsuba_diffraction.optics.mirror import mirror_cosine
 from mitsuba_diffraction.plugin.conductors import tabulated_index
+from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.support.directions import as_single, polar, uniform_directions
 from tests.support.lanes import evaluated, interaction, refusal, spectra
 
@@ -42,14 +43,6 @@ def mirror_cosines(wi, wo):
     return mirror_cosine(cosine, wi[..., 2], wo[..., 2], wavenumber(550.0) * sigma_of(WIDTH))
 
 
-def dielectric(cos_theta, eta):
-    """Unpolarised power reflectance (Born and Wolf 1999, section 1.5.2, eq. 21)."""
-    cos_t = np.sqrt(1 - (1 - cos_theta**2) / eta**2)
-    perpendicular = (cos_theta - eta * cos_t) / (cos_theta + eta * cos_t)
-    parallel = (eta * cos_theta - cos_t) / (eta * cos_theta + cos_t)
-    return 0.5 * (perpendicular**2 + parallel**2)
-
-
 @pytest.fixture
 def pairs():
     """Direction pairs within reach of a mirror's lobe, at all angles."""
@@ -73,7 +66,7 @@ def pairs():
     ],
 )
 def test_dielectrics(some_variant, pairs, parameters, eta):
-    expected = dielectric(mirror_cosines(*pairs), eta)
+    expected = reflectance(mirror_cosines(*pairs), eta)
     # Fresnel's formulas in single precision
     found = ratios(*pairs, 550.0, **parameters)[:, 0]
     assert found == pytest.approx(expected, rel=1e-5, abs=1e-6 if eta == 1.0 else 0.0)

@@ -11,7 +11,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.support.directions import as_single, polar
-from tests.support.lanes import evaluated, interaction, lanes, spectra, vectors
+from tests.support.lanes import bitmap, evaluated, interaction, lanes, spectra, vectors
 from tests.support.plates import (
     OTHER,
     PATCH,
@@ -24,12 +24,9 @@ from tests.support.plates import (
     rendered,
     scene,
 )
+from tests.support.variants import use
 
-# coarse pixels keep the tables small; that is not the point here
-pytestmark = [
-    pytest.mark.thorough,
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-]
+pytestmark = pytest.mark.thorough
 
 
 def load(kind: str, **parameters: Any) -> Any:
@@ -79,15 +76,12 @@ def test_on_a_tilted_frame_it_sees_tilted_directions(variant, kind, theta):
 
     def tilt(nested: dict[str, Any]) -> Any:
         if kind == "normalmap":
-            normal = (0.5 + 0.5 * polar(theta)).astype(np.float32)
-            texture = mi.TensorXf(np.tile(normal, (2, 2, 1)))
-            how = {"normalmap": {"type": "bitmap", "raw": True, "data": texture}}
+            how = {"normalmap": bitmap(np.tile(0.5 + 0.5 * polar(theta), (2, 2, 1)))}
         else:
-            ramp = np.linspace(0.0, 1.0, 64, dtype=np.float32)
-            texture = mi.TensorXf(np.tile(ramp[:, None], (64, 1, 1)))
+            ramp = bitmap(np.tile(np.linspace(0.0, 1.0, 64), (64, 1)), filter_type="bilinear")
             # the ramp rises between the middles of the first and the last pixel
             scale = -float(np.tan(np.radians(theta))) * 63 / 64
-            how = {"texture": {"type": "bitmap", "raw": True, "data": texture}, "scale": scale}
+            how = {"texture": ramp, "scale": scale}
         return load(kind, nested=nested, **how)
 
     tilted, tilted_white = tilt(diffraction()), tilt(grey(1.0))
@@ -144,10 +138,7 @@ def test_each_of_several_surfaces_keeps_its_own_patch(variant):
 
 @pytest.mark.parametrize("name", ["llvm_ad_rgb", "llvm_ad_mono", "cuda_ad_rgb"])
 def test_frozen_rendering_follows_its_parameters(name):
-    backend = dr.JitBackend.CUDA if name.startswith("cuda") else dr.JitBackend.LLVM
-    if not dr.has_backend(backend):
-        pytest.skip(f"{name}: Dr.Jit finds no device for it")
-    mi.set_variant(name)
+    use(name)
     conserving = {"energy_conserving": True, "wavelength": 600.0}
     coated = {"material": None, "int_ior": 1.5, "pigment": grey(0.4)}
     coated = {k: v for k, v in (RAW | conserving | coated).items() if v is not None}
@@ -177,13 +168,10 @@ def test_frozen_eval_and_sample_follow_their_parameters(variant):
     context = mi.BSDFContext()
     evaluate = dr.freeze(lambda bsdf, si, wo: bsdf.eval_pdf(context, si, wo))
     draw = dr.freeze(lambda bsdf, si, one, two: bsdf.sample(context, si, one, two))
-    texture = mi.TensorXf(np.full((2, 2, 3), 0.61, np.float32))
     surfaces = [
         diffraction(energy_conserving=True, lateral_scale=1.0),
         diffraction(OTHER),
-        diffraction(
-            OTHER, coherence="patch", orientation={"type": "bitmap", "raw": True, "data": texture}
-        ),
+        diffraction(OTHER, coherence="patch", orientation=bitmap(np.full((2, 2, 3), 0.61))),
     ]
     for surface in surfaces:
         bsdf = mi.load_dict(surface)

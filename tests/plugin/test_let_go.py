@@ -16,13 +16,9 @@ from tests.support.directions import rough_patch
 from tests.support.kinds import KINDS, MIX, THROUGH, made
 from tests.support.lanes import interaction
 from tests.support.plates import diffraction, plate, rendered, scene
-from tests.support.variants import obstacle
+from tests.support.variants import use
 
-# coarse pixels keep the tables small; that is not the point here
-pytestmark = [
-    pytest.mark.thorough,
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-]
+pytestmark = pytest.mark.thorough
 #: Variants that a mirror is loaded in; other kinds are in the second.
 LOADED = ("scalar_spectral", "llvm_ad_spectral", "llvm_ad_rgb", "llvm_ad_mono")
 
@@ -43,9 +39,7 @@ def without_gc() -> Iterator[None]:
     + [("llvm_ad_spectral", kind) for kind in (*KINDS, *THROUGH, MIX) if kind != "mirror"],
 )
 def test_a_surface_that_is_no_longer_used_is_let_go(variant, kind, without_gc):
-    if reason := obstacle(variant):
-        pytest.skip(reason)
-    mi.set_variant(variant)
+    use(variant)
     bsdf = made(kind, energy_conserving=True)
     si = interaction([0.1, 0.2, 0.97], [[400.0, 500.0, 600.0, 700.0]])
     dr.eval(bsdf.sample(mi.BSDFContext(), si, 0.4, mi.Point2f(0.3, 0.6)))

@@ -1,13 +1,12 @@
 """Options that meet, in a scalar variant: a few directions, without a kernel to compile.
 
-The thorough tests ask more of each: test_kinds_thorough.py, test_polarised.py, test_sides.py.
+The thorough tests ask more of each: test_kinds.py, test_polarised.py, test_transmission.py.
 """
 
 from __future__ import annotations
 
 import itertools
 from types import SimpleNamespace
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -15,27 +14,30 @@ import pytest
 from numpy.testing import assert_allclose
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.optics.paths import ABOVE, Returned
-from tests.support.directions import Array
+from tests.support.directions import Array, polar
 from tests.support.kinds import COATED, FILMED, METAL, MORE, PLACED, PLANE, SLOPE, Kind, lit
-from tests.support.lanes import interaction, vectors
+from tests.support.lanes import interaction, with_bitmaps
 from tests.support.layered import PATCH, WIDTH, load
-from tests.support.stokes import REVERSAL, bases, rotation
+from tests.support.stokes import REVERSAL, bases, matrices, reference_matrices, rotation
 from tests.support.transmitting import BELOW, INDICES, SIDES, both
-from tests.support.variants import runs
+from tests.support.variants import use
 
 #: Where light falls; v runs against the second axis of the frame.
 UV = np.array([0.4, -0.9])
+PLACE = {"uv": UV.tolist(), "dp_du": [1, 0, 0], "dp_dv": [0, -1, 0]}
 #: A quarter of the way from 100 to 700 nm.
-SHARES = {"type": "bitmap", "raw": True}
-ENDS = {"film_thickness": SHARES, "film_thickness_min": 100.0, "film_thickness_max": 700.0}
+ENDS = {"film_thickness_min": 100.0, "film_thickness_max": 700.0}
+QUARTER = ENDS | {"film_thickness": np.full((2, 2), 0.25)}
 SURFACE = {"coherence": "surface", "uv_scale": 10.0}
 MEETING = {
     "film on a dielectric": MORE["film on a dielectric"],
+    "interface from above": Kind(
+        INDICES | {"plugin": "diffraction_dielectric"}, SLOPE | {"eta": 1.5}
+    ),
     "film of a texture, tangent plane, lower": Kind(
-        FILMED[0] | ENDS | PLANE | {"height_scale": 0.5}, FILMED[1] | PLANE, height=0.5
+        FILMED[0] | QUARTER | PLANE | {"height_scale": 0.5}, FILMED[1] | PLANE, height=0.5
     ),
     "one window of a metal": Kind(
         METAL | {"coherence": "patch"}, METAL | SLOPE | {"coherence": "patch"}
@@ -48,19 +50,7 @@ MEETING = {
 
 @pytest.fixture(autouse=True)
 def without_kernels() -> None:
-    if not runs("scalar_spectral_polarized"):
-        pytest.skip("scalar_spectral_polarized is not here")
-    mi.set_variant("scalar_spectral_polarized")
-
-
-def matrices(bsdf: Any, wi: Array, wo: Array, lam: Array, mode: str = "Radiance") -> Array:
-    """f·|cosθo|, Mueller matrices (n, 4, 4, 4), of pairs (n, 3) and wavelengths (n, 4)."""
-    context, found = mi.BSDFContext(getattr(mi.TransportMode, mode)), []
-    for i, o, waves in zip(wi, wo, lam, strict=True):
-        si = interaction(i, waves)
-        si.uv, si.dp_du, si.dp_dv = mi.Point2f(*UV.tolist()), [1, 0, 0], [0, -1, 0]
-        found.append(np.moveaxis(np.array(bsdf.eval(context, si, vectors(o)), float), 2, 0))
-    return np.array(found)
+    use("scalar_spectral_polarized")
 
 
 def few(*chosen: int) -> tuple[Array, Array, Array]:
@@ -69,29 +59,28 @@ def few(*chosen: int) -> tuple[Array, Array, Array]:
     return wi[[*chosen]], wo[[*chosen]], lam[[*chosen]]
 
 
+def assert_each_close(found: Array, expected: Array, relative: float, of_largest: float) -> None:
+    """Compare the matrices of each pair: far from the mirror direction there is less light."""
+    for one, known in zip(found, expected, strict=True):
+        assert_allclose(one, known, rtol=relative, atol=of_largest * known.max())
+
+
 @pytest.mark.parametrize("kind", MEETING)
 def test_light_is_the_reference_s(kind):
     parameters, known, stretch, height = MEETING[kind]
     wi, wo, lam = few(8, -1)
-    if "film_thickness_max" in parameters:
-        quarter = mi.TensorXf(np.full((2, 2, 1), 0.25, np.float32))
-        parameters = parameters | {"film_thickness": SHARES | {"data": quarter}}
-    found = matrices(load(**parameters), wi, wo, lam)
+    found = matrices(load(**with_bitmaps(parameters)), wi, wo, lam, **PLACE)
     patch = md.HeightField(height * PATCH.heights, PATCH.pixel_size).stretched(stretch)
     own = {"coherence_width": WIDTH * stretch} | known
     own |= {"place": 10.0 * UV * [1, -1]} if "place" in known else {}
-    s_in, s_out = reference.boundary.polarisation_axes(wo, wi)  # light comes along ωo
-    before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)
-    for n, one in enumerate(lam.T):
-        expected = after @ reference.mueller(patch, wo, wi, one, **own) @ before
-        expected *= wo[:, 2, None, None]
-        # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
-        assert_allclose(found[:, n], expected, rtol=1e-3, atol=1e-5 * expected.max())
+    expected = reference_matrices(patch, wi, wo, lam, **own)
+    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+    assert_allclose(found, expected, rtol=1e-3, atol=1e-5 * expected.max())
 
 
 @pytest.mark.parametrize("kind", SIDES)
 def test_light_that_goes_through_has_the_transposed_matrix_in_reverse(kind):
-    wi, wo, lam = few(8)
+    wi, wo, lam = few(8, -2, -1)
     wo, bsdf = wo * BELOW, both(**SIDES[kind])
     there, back = matrices(bsdf, wi, wo, lam), matrices(bsdf, wo, wi, lam)
     there, back = (m / np.abs(w[:, None, 2, None, None]) for m, w in ((there, wo), (back, wi)))
@@ -101,12 +90,26 @@ def test_light_that_goes_through_has_the_transposed_matrix_in_reverse(kind):
     after = rotation(bases(wo), bases(-wo), wo)[:, None]
     before = rotation(bases(-wi), bases(wi), -wi)[:, None]
     expected = REVERSAL @ there.swapaxes(-1, -2) @ REVERSAL
-    for found, known in ((after @ back @ before, expected), (adjoint, there)):
-        assert_allclose(found, known, rtol=1e-4, atol=1e-5 * there.max())
+    assert_each_close(after @ back @ before, expected, 1e-4, 1e-5)
+    assert_each_close(adjoint, there, 1e-4, 1e-5)
+
+
+@pytest.mark.parametrize("theta", [40.0, 140.0])
+@pytest.mark.parametrize("kind", SIDES)
+def test_a_sample_tells_its_side_its_component_and_the_index_that_it_enters(kind, theta):
+    bsdf, si = both(**SIDES[kind]), interaction(polar(theta, 20.0), 550.0)
+    samples = [bsdf.sample(mi.BSDFContext(), si, n / 16, [0.3, 0.6])[0] for n in range(16)]
+    passed = [one for one in samples if one.wo.z * si.wi.z < 0.0]
+    assert 0 < len(passed) < len(samples)
+    for one in samples:
+        assert one.sampled_component == (one in passed)
+        assert (one.sampled_type == +mi.BSDFFlags.GlossyTransmission) == (one in passed)
+    eta = 1.0 if kind == "sheet" else 1.5 if theta < 90.0 else 1 / 1.5
+    assert [one.eta for one in passed] == pytest.approx([eta] * len(passed))
 
 
 def test_below_a_sheet_light_is_that_of_air_under_a_coat_in_a_mirror():
-    wi, wo, lam = few(8)
+    wi, wo, lam = few(8, -2, -1)
     found = matrices(both(thin=True), wi * BELOW, wo * BELOW, lam)
     turned = md.HeightField(-PATCH.heights, PATCH.pixel_size)
     above = matrices(load(turned, eta=1.0, k=0.0, coat_ior=1.5), wi, wo, lam)
@@ -114,7 +117,7 @@ def test_below_a_sheet_light_is_that_of_air_under_a_coat_in_a_mirror():
     before = flip @ rotation(bases(-wo * BELOW), bases(-wo) * BELOW, -wo * BELOW)
     after = rotation(bases(wi) * BELOW, bases(wi * BELOW), wi * BELOW) @ flip
     expected = after[:, None] @ above @ before[:, None]
-    assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * expected.max())
+    assert_each_close(found, expected, 2e-3, 1e-4)
 
 
 def test_a_sheet_s_flat_side_sends_back_orders_by_the_depths_of_both_passages():

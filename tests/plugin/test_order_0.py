@@ -14,22 +14,12 @@ from tests.support.furnace import furnace_in
 from tests.support.lanes import brdf_values, evaluated
 from tests.support.patches import SMALL_SCAN
 
-# a small scan is what is tested
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-
 MIRROR = {"material": "none", "energy_conserving": False}
 SIGMA_0 = 65.0 / 4.0
 
 
 def load(**parameters):
     return mi.load_dict(md.bsdf_dict(SMALL_SCAN, **parameters))
-
-
-def pairs_of_the_mirror(count, seed):
-    """Directions and wavelengths in the lobe of the light, and elsewhere."""
-    wi, wo, lam, near = lit_pairs(SMALL_SCAN, SIGMA_0, count, seed)
-    assert near.any()
-    return wi, wo, lam, near
 
 
 @pytest.mark.parametrize(
@@ -42,7 +32,8 @@ def pairs_of_the_mirror(count, seed):
     ids=["mirror", "dielectric", "coat"],
 )
 def test_values_are_those_of_the_model(some_variant, parameters, reference):
-    wi, wo, lam, near = pairs_of_the_mirror(60, 5)
+    wi, wo, lam, near = lit_pairs(SMALL_SCAN, SIGMA_0, 60, 5)
+    assert near.any()
     conserving = {"energy_conserving": False}
     bsdf = load(**(conserving | parameters))
     found = brdf_values(bsdf, wi, wo, lam[:, None])

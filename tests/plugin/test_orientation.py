@@ -11,9 +11,9 @@ import pytest
 
 from mitsuba_diffraction.plugin.description import describe
 from mitsuba_diffraction.plugin.varying import PRECISION
-from tests.support.directions import polar
 from tests.support.gentle import directions, load, pairs
-from tests.support.lanes import evaluated, interaction, refusal
+from tests.support.lanes import bitmap, evaluated, refusal
+from tests.support.variants import SOME, VARIANTS, evaluate, use
 
 
 @pytest.mark.parametrize(
@@ -31,13 +31,21 @@ def test_a_picture_that_holds_no_directions_is_refused(every_variant, texture, m
     assert re.search(mend, said)
 
 
-@pytest.mark.parametrize("degrees", [0.0, 53.13010235, 90.0, 45.0])
-def test_directions_that_integers_could_hold_are_taken(some_variant, degrees):
-    """(0.6, 0.8) is a multiple of 1/255: no reason to refuse it."""
+@pytest.mark.parametrize(
+    ("variant", "degrees"),
+    # (0.6, 0.8) is a multiple of 1/255: no reason to refuse it
+    [(VARIANTS[0], degrees) for degrees in (0.0, 53.13010235, 90.0, 45.0)]
+    + [pytest.param(variant, 25.0, marks=pytest.mark.thorough) for variant in SOME],
+)
+def test_a_picture_of_directions_turns_as_degrees_do(variant, degrees):
+    use(variant)
     wi, wo, lam = pairs(20)
-    textured = load(orientation=directions([degrees] * 4))
-    expected = evaluated(load(orientation=degrees), wi, wo, lam[:, None])
-    found = evaluated(textured, wi, wo, lam[:, None])
+    lam = np.tile(lam[:, None], 4)
+    samples = np.random.default_rng(3).random((20, 3))
+    found, expected = (
+        evaluate(load(orientation=by), wi, wo, samples, lam)[0]
+        for by in (directions([degrees] * 4), degrees)
+    )
     # the angle's sine in single precision, times kσ = 16
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
 
@@ -47,9 +55,7 @@ def test_directions_that_integers_could_hold_are_taken(some_variant, degrees):
 def test_integers_hold_directions_to_the_stated_precision(some_variant, bits, degrees):
     levels, angle = 2**bits - 1, np.deg2rad(degrees)
     doubled = np.array([1.0 + np.cos(angle), 1.0 + np.sin(angle), 1.0]) / 2.0
-    data = np.tile(np.rint(doubled * levels) / levels, (2, 2, 1)).astype(np.float32)
-    texture = {"type": "bitmap", "raw": True, "data": mi.TensorXf(data)}
-    bsdf = load(orientation=texture)
+    bsdf = load(orientation=bitmap(np.tile(np.rint(doubled * levels) / levels, (2, 2, 1))))
     si = dr.zeros(mi.SurfaceInteraction3f)
     cos, sin, _ = (np.ravel(x)[0] for x in describe(bsdf).frame(si))
     error = np.degrees(np.angle(np.exp(1j * (np.arctan2(sin, cos) - angle))))
@@ -58,8 +64,7 @@ def test_integers_hold_directions_to_the_stated_precision(some_variant, bits, de
 
 
 def test_the_middle_of_a_picture_of_8_bits_turns_nothing(some_variant):
-    data = np.full((2, 2, 3), 128 / 255, np.float32)
-    bsdf = load(orientation={"type": "bitmap", "raw": True, "data": mi.TensorXf(data)})
+    bsdf = load(orientation=bitmap(np.full((2, 2, 3), 128 / 255)))
     cos, sin, _ = (np.ravel(x)[0] for x in describe(bsdf).frame(dr.zeros(mi.SurfaceInteraction3f)))
     assert (cos, sin) == (1.0, 0.0)
 
@@ -67,21 +72,6 @@ def test_the_middle_of_a_picture_of_8_bits_turns_nothing(some_variant):
 @pytest.mark.parametrize("degrees", [1e30, -40_000.0])
 def test_angles_without_digits_are_refused(every_variant, degrees):
     assert "at least -36000° and at most 36000°" in refusal(lambda: load(orientation=degrees))
-
-
-@pytest.mark.thorough
-def test_textured_samples_are_drawn_as_densely_as_pdf_says(some_variant):
-    bsdf, n = load(orientation=directions([53.13010235] * 4)), 20000
-    si = interaction(np.tile(polar(30.0, 20.0), (n, 1)), [[400.0, 500.0, 600.0, 700.0]])
-    rng = mi.PCG32(n)
-    two = mi.Point2f(rng.next_float32(), rng.next_float32())
-    sample, weight = bsdf.sample(mi.BSDFContext(), si, rng.next_float32(), two)
-    density = bsdf.pdf(mi.BSDFContext(), si, sample.wo)
-    dr.eval(sample, weight, density)  # one kernel instead of three
-    good = np.array(sample.pdf) > 0
-    assert np.array(density)[good] == pytest.approx(np.array(sample.pdf)[good], rel=1e-3)
-    # a shallow patch: nearly all power is in few lobes, found only if drawn where `eval` has them
-    assert np.array(weight).mean(axis=1) == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.thorough

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 import mitsuba as mi
-import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
 from tests.support.directions import rough_patch
-from tests.support.lanes import refusal
+from tests.support.lanes import bitmap, refusal
 
 #: 2.56 × 2.4 µm and gentle, so that nothing warns of it.
 PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)
@@ -23,10 +22,9 @@ PLACED = {"coherence": "surface", "uv_scale": 10.0}
 BOARD = {"type": "checkerboard"}
 
 
-def bitmap(*values: float, raw: bool = True) -> Callable[[], dict[str, Any]]:
+def texels(*values: float, **more: Any) -> Callable[[], dict[str, Any]]:
     """A function that makes a bitmap of these numbers in the variant that is set."""
-    texels = np.array(values, np.float32).reshape(1, -1, 1)
-    return lambda: {"type": "bitmap", "raw": raw, "data": mi.TensorXf(texels)}
+    return lambda: bitmap([values], **more)
 
 
 REFUSED = [
@@ -133,21 +131,21 @@ REFUSED = [
     ({"lateral_scale": -1.0}, "lateral_scale=-1 must be at least 0.01"),
     ({"lateral_scale": math.nan}, "lateral_scale=nan must be a finite number"),
     ({"lateral_scale": 200.0}, "at most 100"),
-    ({"lateral_scale": bitmap(0.0, 0.7)}, "numbers go from 0 to 0.7"),
-    ({"lateral_scale": bitmap(-1.3, -0.6)}, "largest factor, -0.6, must be at least"),
-    ({"lateral_scale": bitmap(math.nan)}, "largest factor, nan, must be"),
-    ({"lateral_scale": bitmap(1.0, raw=False)}, "the bitmap is not raw"),
+    ({"lateral_scale": texels(0.0, 0.7)}, "numbers go from 0 to 0.7"),
+    ({"lateral_scale": texels(-1.3, -0.6)}, "largest factor, -0.6, must be at least"),
+    ({"lateral_scale": texels(math.nan)}, "largest factor, nan, must be"),
+    ({"lateral_scale": texels(1.0, raw=False)}, "the bitmap is not raw"),
     ({"lateral_scale": BOARD}, "needs lateral_scale_max"),
     ({"lateral_scale": BOARD | {"color0": 0.0}, "lateral_scale_max": 1.0}, "go from 0"),
     ({"lateral_scale": 1.2, "lateral_scale_max": 1.1}, "must be at least lateral_scale, 1.2"),
     ({"lateral_scale_max": 1.1}, "give both, or none"),
     ({"height_scale": 1.2, "height_scale_max": 2.0}, "for a height_scale that is a texture"),
-    ({"height_scale": bitmap(-1.0, -0.0)}, "largest factor, -0, must be above 0"),
-    ({"height_scale": bitmap(math.nan)}, "largest factor, nan, must be"),
-    ({"height_scale": bitmap(-1.0, 0.25)}, "numbers go from -1 to 0.25"),
-    ({"height_scale": bitmap(2e3)}, "must be"),
-    ({"height_scale": bitmap(0.25, 1.25), "height_scale_max": 1.0}, "must be between 0 and 1"),
-    ({"height_scale": bitmap(1.0, raw=False)}, "the bitmap is not raw"),
+    ({"height_scale": texels(-1.0, -0.0)}, "largest factor, -0, must be above 0"),
+    ({"height_scale": texels(math.nan)}, "largest factor, nan, must be"),
+    ({"height_scale": texels(-1.0, 0.25)}, "numbers go from -1 to 0.25"),
+    ({"height_scale": texels(2e3)}, "must be"),
+    ({"height_scale": texels(0.25, 1.25), "height_scale_max": 1.0}, "must be between 0 and 1"),
+    ({"height_scale": texels(1.0, raw=False)}, "the bitmap is not raw"),
     ({"height_scale": BOARD}, "needs height_scale_max"),
     ({"height_scale": {"type": "mesh_attribute", "name": "vertex_worn"}}, "height_scale_max"),
 ]

@@ -10,9 +10,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import mitsuba_diffraction as md
 from tests.support import ROOT
-from tests.support.gentle import PATCH, WIDTH, load, pairs
+from tests.support.gentle import PATCH, load, pairs
 from tests.support.lanes import evaluated
 
 XML = """<scene version="3.0.0">
@@ -51,13 +50,6 @@ def test_scenes_in_xml_render(variant, tmp_path, monkeypatch):
     # a sky of radiance 1 over 20 % pigment and a few per cent of reflection, in sRGB's luminance
     luminance = image[3:5, 3:5, :3].mean()
     assert 0.1 < luminance < 0.4
-
-
-def test_a_dictionary_from_arrays(some_variant):
-    given = md.bsdf_dict(PATCH, material="Al", coherence_width=WIDTH, energy_conserving=False)
-    assert given["type"] == "diffraction"
-    bsdf = mi.load_dict({"type": "sphere", "bsdf": given}).bsdf()
-    assert bsdf.table.source["pixel_size"] == [0.085, 0.08]
 
 
 def test_variants_may_be_switched_back_and_forth(some_variant):

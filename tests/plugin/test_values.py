@@ -11,7 +11,7 @@ import mitsuba_diffraction as md
 from tests.support.directions import polar
 from tests.support.gentle import load, pairs
 from tests.support.lanes import brdf_values, evaluated, interaction, spectra, vectors
-from tests.support.variants import obstacle
+from tests.support.variants import use
 
 
 @pytest.mark.parametrize("basis", ["svd", "chebyshev", "taylor"])
@@ -96,9 +96,7 @@ PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.5}}
     ],
 )
 def test_the_albedo_is_the_same_from_all_sides_and_at_most_1(variant, surface, expected):
-    if reason := obstacle(variant):
-        pytest.skip(reason)
-    mi.set_variant(variant)
+    use(variant)
     bsdf = load(**surface)
     found = np.array(
         [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from mitsuba_diffraction.tables.colour import ColourTable
 from tests.support.directions import Array, polar
 from tests.support.lanes import interaction, spectra, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
-from tests.support.variants import ALL, evaluate, runs
+from tests.support.variants import ALL, evaluate, use
 
 pytestmark = pytest.mark.thorough
 
@@ -44,9 +43,7 @@ def expected(wi: Array, wo: Array, wavelengths: Array) -> Array:
 
 @pytest.mark.parametrize("name", ALL)
 def test_values_are_those_of_the_table(name: str) -> None:
-    if not runs(name):
-        pytest.skip(f"{name}: Dr.Jit finds no device for it")
-    mi.set_variant(name)
+    use(name)
     wi, wo, lam, samples = lit()
     value = evaluate(load(material="none", wavelength=600.0), wi, wo, samples, lam)[0]
     truth = expected(wi, wo, lam)
@@ -57,24 +54,9 @@ def test_values_are_those_of_the_table(name: str) -> None:
     assert value == pytest.approx(truth, rel=2e-3, abs=2e-5 * np.abs(truth).max())
 
 
-def test_a_picture_of_directions_turns_as_degrees_do(every_variant: str) -> None:
-    angle = np.deg2rad(25.0)
-    picture = np.broadcast_to([np.cos(angle), np.sin(angle), 0.0], (2, 2, 3)).astype(np.float32)
-    texture = {"type": "bitmap", "raw": True, "data": mi.TensorXf(picture)}
-    wi, wo, lam, samples = lit()
-    turned, expected = (
-        evaluate(load(wavelength=600.0, orientation=by), wi, wo, samples, lam)[0]
-        for by in (texture, 25.0)
-    )
-    # the angle's sine in single precision, times kσ = 20
-    assert turned == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
-
-
 @pytest.mark.parametrize("name", [name for name in ALL if name.endswith("rgb")])
 def test_colours_of_the_spectrum_are_outside_the_displays_gamut(name: str) -> None:
-    if not runs(name):
-        pytest.skip(f"{name}: Dr.Jit finds no device for it")
-    mi.set_variant(name)
+    use(name)
     grating = gratings.blazed(period=2.0, depth=0.25, periods=6, rows=8)
     x = np.linspace(0.2, 0.35, 8)  # order 1, from 400 to 700 nm
     wi, wo = np.tile([0.0, 0.0, 1.0], (8, 1)), np.stack([x, 0.0 * x, np.sqrt(1.0 - x**2)], axis=1)
@@ -85,9 +67,7 @@ def test_colours_of_the_spectrum_are_outside_the_displays_gamut(name: str) -> No
 
 
 def test_in_rgb_a_channel_has_the_boundary_of_one_wavelength() -> None:
-    if not runs("llvm_ad_rgb"):
-        pytest.skip("llvm_ad_rgb: Dr.Jit finds no device for it")
-    mi.set_variant("llvm_ad_rgb")
+    use("llvm_ad_rgb")
     wi, wo, lam = pairs(24)
     samples = np.full((len(wi), 3), 0.5)
     small, mirror = (
@@ -106,17 +86,15 @@ def test_in_rgb_a_channel_has_the_boundary_of_one_wavelength() -> None:
 
 def test_gold_has_the_colour_of_its_spectrum(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nearer than with one reflectance a channel, which lines of light do not all share."""
-    mi.set_variant("llvm_ad_spectral" if runs("llvm_ad_spectral") else "scalar_spectral")
+    use("llvm_ad_spectral")  # scalar variants would take minutes
     wi, wo, *_ = lit()
     lines = np.arange(362.5, 780.0, 5.0, np.float32).reshape(-1, 4)
     bsdf, truth = load(material="Au"), np.zeros((len(wi), 3))
-    for group in lines if dr.is_jit_v(mi.Float) else []:
+    for group in lines:
         si = interaction(wi, np.tile(group, (len(wi), 1)))
         value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))).T
         truth += 5.0 * value @ linear_srgb(response(group))
-    if not truth.any():
-        pytest.skip("scalar variants would take minutes")
-    mi.set_variant(mi.variant().replace("spectral", "rgb"))
+    use("llvm_ad_rgb")
     errors = []
     for tinted in (True, False):
         with monkeypatch.context() as patch:

@@ -20,7 +20,7 @@ from mitsuba_diffraction.shading.pair_power import Coat, pair_power
 from tests.support.formulas import COAT, INDICES, check, pairs
 from tests.support.languages import emitted, shaded
 from tests.support.pages import blocks
-from tests.support.variants import obstacle
+from tests.support.variants import use
 
 pytestmark = pytest.mark.thorough  # a browser, Blender, and a table
 
@@ -31,8 +31,7 @@ SOURCE = blocks("docs/extending.md", "python")[0]
 @pytest.fixture(scope="module")
 def model() -> Iterator[Model]:
     """The page's model. Its file compares Dr.Jit with `md.reference`."""
-    if reason := obstacle("llvm_ad_spectral"):
-        pytest.skip(reason)
+    use("llvm_ad_spectral")
     before = dict(MODELS)
     exec(SOURCE, {"__name__": "extending"})
     yield MODELS["dulled"]

@@ -28,12 +28,9 @@ from mitsuba_diffraction.scene import read_exr
 from tests.support.blender import blender, result_of
 from tests.support.pictures import picture
 from tests.support.surfaces import SURFACES
-from tests.support.variants import VARIANTS, obstacle
+from tests.support.variants import VARIANTS, use
 
-pytestmark = [
-    pytest.mark.thorough,
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-]
+pytestmark = pytest.mark.thorough
 
 Array = NDArray[np.float64]
 
@@ -161,10 +158,7 @@ def refusal(bsdf: Any) -> str | None:
 
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Stage:
-    name = next((name for name in VARIANTS if obstacle(name) is None), None)
-    if name is None:
-        pytest.skip("no variant runs here")
-    mi.set_variant(name)
+    use(*VARIANTS)
     folder = tmp_path_factory.mktemp("arches")
     loaded = {name: mi.load_dict(make(folder)) for name, make in SURFACES.items()}
     bsdfs = {n: b for n, b in loaded.items() if refusal(b) is None}

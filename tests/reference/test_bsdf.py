@@ -67,26 +67,6 @@ def test_the_brdf_is_the_factor_times_that_power(coherence, place):
     assert value[0] == pytest.approx(expected, rel=bound)
 
 
-def test_an_ensemble_is_the_mean_of_patches_under_windows_anywhere():
-    # the same patch cut anew at random places puts its centre, and so its window, there
-    rng = np.random.default_rng(3)
-    wi, wo = polar(15, 200), polar(30, 30)
-    arguments = {"coherence_width": 4 * SIGMA, "coherence": "patch"}
-    values = [
-        reference.brdf(
-            HeightField(np.roll(SMALL.heights, shift, (0, 1)), SMALL.pixel_size),
-            wi,
-            wo,
-            550.0,
-            **arguments,
-        )[0]
-        for shift in zip(rng.integers(0, 12, 400), rng.integers(0, 15, 400), strict=True)
-    ]
-    ensemble = reference.brdf(SMALL, wi, wo, 550.0, coherence_width=4 * SIGMA)[0]
-    # three standard errors of a mean of 400
-    assert abs(np.mean(values) - ensemble) < 3 * np.std(values) / 20
-
-
 def test_an_ensemble_is_the_mean_over_all_places():
     # |P|² has no frequencies beyond those of 12 × 15 pixels, twice over: this grid's mean is exact
     n = 32

@@ -9,7 +9,7 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics import blend
 from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
-from mitsuba_diffraction.reference import boundary, fresnel, model
+from mitsuba_diffraction.reference import boundary, model
 from tests.support.directions import polar, rough_patch
 from tests.support.matrices import pairs
 
@@ -69,25 +69,6 @@ def test_small_slope_is_the_default_where_there_is_an_index():
         reference.btdf(FIELD, *through, eta=1.5),
         reference.btdf(FIELD, *through, eta=1.5, model="small_slope"),
     )
-
-
-@pytest.mark.parametrize("material", [KERATIN, ALUMINIUM])
-@pytest.mark.parametrize("model", reference.MODELS)
-def test_the_brdf_of_a_material_is_reciprocal(model, material):
-    wi, wo = polar(65, 20), polar(25, 150)
-    there = reference.brdf(FIELD, wi, wo, 520.0, coherence_width=3.0, model=model, **material)
-    back = reference.brdf(FIELD, wo, wi, 520.0, coherence_width=3.0, model=model, **material)
-    assert there[0] > 0
-    assert back == pytest.approx(there, rel=1e-10)
-
-
-@pytest.mark.parametrize("model", reference.MODELS)
-def test_in_the_mirror_direction_it_is_fresnel_s_share_of_the_perfect_reflector(model):
-    wi, wo = polar(50, 30), polar(50, 210)
-    perfect = reference.brdf(FIELD, wi, wo, 520.0)
-    share = fresnel.reflectance(wi[2], 0.65 + 5.6j)
-    found = reference.brdf(FIELD, wi, wo, 520.0, model=model, **ALUMINIUM)
-    assert found == pytest.approx(share * perfect, rel=1e-10)
 
 
 @pytest.mark.parametrize("coat", [None, 1.58])

@@ -10,7 +10,6 @@ from mitsuba_diffraction.reference import boundary, fresnel, through
 from mitsuba_diffraction.reference.coat import refracted, transmitted
 from mitsuba_diffraction.reference.fresnel import amplitudes
 from mitsuba_diffraction.reference.mirror import solution
-from mitsuba_diffraction.reference.model import small_slope
 from tests.support.directions import polar
 from tests.support.matrices import pairs
 
@@ -102,15 +101,6 @@ def test_under_a_coat_no_light_is_gained_whatever_the_structure_does_with_it(ind
     for out in range(2):
         for into in range(2):
             assert np.all(face[into] + most[:, out, into] * mirror[into] < 1.0 + 1e-9)
-
-
-def test_a_coat_is_reciprocal():
-    wi, wo = polar(60.0, 10.0), polar(30.0, 130.0)
-    below, above = refracted(wi, 1.5), refracted(wo, 1.5)
-    there = transmitted(small_slope(below, above, 0.6 + 4j), wi, wo, 1.5, 0.6 + 4j)
-    back = transmitted(small_slope(above, below, 0.6 + 4j), wo, wi, 1.5, 0.6 + 4j)
-    signs = np.array([[1.0, -1.0], [-1.0, 1.0]])  # reversed light has the other p
-    assert there == pytest.approx(signs * back.T, abs=1e-12)
 
 
 def test_the_fit_at_the_horizon_is_that_of_the_fixed_point():

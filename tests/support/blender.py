@@ -16,6 +16,47 @@ from mitsuba_diffraction import DiffractionError
 #: Seconds after which a program counts as stuck.
 TIMEOUT = 300.0
 
+#: Python of Blender's: a plane whose surface is a script of OSL, and what a camera above it sees.
+PLANE = """
+import bpy, _cycles, numpy as np
+from pathlib import Path
+
+def compiled(source):
+    file = source.with_suffix(".oso")
+    assert _cycles.osl_compile(str(source), str(file)), "no OSL"
+    return file
+
+def with_script(shader, output, pixels, samples):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.device, scene.cycles.shading_system = "CPU", True
+    scene.cycles.samples, scene.cycles.use_denoising = samples, False
+    scene.cycles.use_adaptive_sampling = False
+    scene.render.resolution_x = scene.render.resolution_y = pixels
+    material = bpy.data.materials.new("surface")
+    tree = material.node_tree
+    tree.nodes.clear()
+    script = tree.nodes.new("ShaderNodeScript")
+    script.mode, script.filepath = "EXTERNAL", str(shader)
+    bsdf = script.outputs.new("NodeSocketShader", output)
+    end = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(bsdf, end.inputs["Surface"])
+    return scene, material, script
+
+def seen(scene, file, **camera):
+    bpy.ops.object.camera_add(**camera)
+    scene.camera = bpy.context.object
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 1.0
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(file)
+    bpy.ops.render.render(write_still=True)
+    picture = bpy.data.images.load(scene.render.filepath)
+    picture.colorspace_settings.name = "Non-Color"
+    return np.array(picture.pixels[:]).reshape(-1, 4)
+"""
+
 
 def blender() -> list[str]:
     """Command that runs a script in Blender, without the script's name; skips without Blender."""

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 import mitsuba_diffraction as md
-from tests.support.variants import VARIANTS, obstacle
+from tests.support.variants import VARIANTS, use
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
@@ -44,10 +42,7 @@ def load_scene(**surface: Any) -> Any:
     import mitsuba as mi
     import numpy as np
 
-    name = next((name for name in VARIANTS if obstacle(name) is None), None)
-    if name is None:
-        pytest.skip(f"none of {', '.join(VARIANTS)} runs on this machine")
-    mi.set_variant(name)
+    use(*VARIANTS)
     transform = mi.ScalarTransform4f
     chequers = np.full((8, 8, 3), 0.1, np.float32)
     chequers[::2, ::2] = [0.5, 0.3, 0.2]

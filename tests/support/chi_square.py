@@ -37,7 +37,7 @@ AZIMUTH = 40.0
 @dataclass(frozen=True)
 class Case:
     """A surface, light from θ degrees, wavelengths in nm, where the histogram looks, and which
-    component the context asks for."""
+    component the context asks for; of light that goes through, the side that it leaves to."""
 
     heights: Any
     theta: float
@@ -45,6 +45,7 @@ class Case:
     parameters: dict[str, Any] = field(default_factory=dict)
     order: tuple[float, float] | None = None  # rad/µm; None for the whole disc
     component: int | None = None  # None for all
+    side: float = 0.0  # 1 above, -1 below
 
     def load(self, shared: Any = None) -> Any:
         heights = self.heights
@@ -62,6 +63,22 @@ class Case:
 
 RESOLUTION = 64
 SAMPLES = 1 << 20
+
+
+class OneSide:
+    """A BSDF whose directions on one side are as if above, and on the other none."""
+
+    def __init__(self, bsdf: Any, side: float) -> None:
+        self._bsdf, self._turn = bsdf, mi.Vector3f(1.0, 1.0, side)
+
+    def sample(self, context: Any, si: Any, one: Any, two: Any) -> Any:
+        found, weight = self._bsdf.sample(context, si, one, two)
+        found.wo = found.wo * self._turn
+        found.pdf = dr.select(found.wo.z > 0.0, found.pdf, 0.0)
+        return found, weight
+
+    def pdf(self, context: Any, si: Any, wo: Any) -> Any:
+        return dr.select(wo.z > 0.0, self._bsdf.pdf(context, si, wo * self._turn), 0.0)
 
 
 class EqualAreas:
@@ -101,6 +118,7 @@ def chi_square(
     bsdf: Any, case: Case, *, pdf_at: tuple[float, ...] | None = None, samples: int = SAMPLES
 ) -> Any:
     """The test of a case; `pdf_at` asks for the density at other wavelengths than sampled."""
+    bsdf = OneSide(bsdf, case.side) if case.side else bsdf
     wi = polar(case.theta, AZIMUTH)
     context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), case.component)
 

@@ -25,6 +25,7 @@ from tests.support.instruments import nanoscope
 from tests.support.logos import drawn, write_board, write_boxes
 from tests.support.orders import thin_grating
 from tests.support.pages import blocks, spans, typed
+from tests.support.scenes import searched
 
 NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan", "--crossed"}
 # one wavelength stands for all, and few points do
@@ -194,15 +195,9 @@ def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mitsuba_diffraction.orders.solve.accuracy.SAMPLES", 16)
     monkeypatch.chdir(tree)
     # as in a process of its own: Mitsuba looks for files where it was imported
-    before = mi.file_resolver()
-    resolver = mi.FileResolver(before)
-    resolver.prepend(str(tree))
-    mi.set_file_resolver(resolver)
-    try:
+    with searched(tree):
         for words in commands(page):
             run(words)
-    finally:
-        mi.set_file_resolver(before)
 
 
 #: One patch for all scenes, whose table is made once.

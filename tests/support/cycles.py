@@ -8,32 +8,19 @@ from typing import NamedTuple
 import numpy as np
 
 from mitsuba_diffraction.osl import Exported
-from tests.support.blender import result_of
+from tests.support.blender import PLANE, result_of
 from tests.support.directions import Array
 
-_CODE = """
-import bpy, math, _cycles, numpy as np
-from pathlib import Path
+_CODE = f"""{PLANE}
+import math
 folder = Path(folder)
 document = json.loads((folder / document).read_text(encoding="utf-8"))
-compiled = folder / "shader.oso"
-assert _cycles.osl_compile(str(folder / document["shader"]), str(compiled)), "no OSL"
+shader = compiled(folder / document["shader"])
 result = []
 for degrees in tilts:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.cycles.device, scene.cycles.shading_system = "CPU", True
-    scene.cycles.samples, scene.cycles.use_denoising = samples, False
-    scene.cycles.use_adaptive_sampling = False
-    scene.render.resolution_x = scene.render.resolution_y = pixels
+    scene, material, script = with_script(shader, document["output"], pixels, samples)
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
-    material = bpy.data.materials.new("surface")
     tree = material.node_tree
-    tree.nodes.clear()
-    script = tree.nodes.new("ShaderNodeScript")
-    script.mode, script.filepath = "EXTERNAL", str(compiled)
-    bsdf = script.outputs.new("NodeSocketShader", document["output"])
     for item in document["inputs"]:
         name = item["identifier"]
         socket = script.inputs.new(item["socket"], item["label"], identifier=name)
@@ -48,8 +35,6 @@ for degrees in tilts:
             tangent = tree.nodes.new("ShaderNodeTangent")
             tangent.direction_type = "UV_MAP"
             tree.links.new(tangent.outputs[0], socket)
-    end = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(bsdf, end.inputs["Surface"])
     bpy.ops.mesh.primitive_plane_add(size=1000)
     bpy.context.object.data.materials.append(material)
     world = scene.world = bpy.data.worlds.new("sky")
@@ -71,16 +56,7 @@ for degrees in tilts:
     tilt = math.radians(degrees)
     # the camera looks from x, and sees nothing but the plane up to 89.9°
     place = (40 * math.sin(tilt), 0, 40 * math.cos(tilt))
-    bpy.ops.object.camera_add(location=place, rotation=(0, tilt, 0))
-    scene.camera = bpy.context.object
-    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 1.0
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
-    scene.render.filepath = str(folder / "picture.exr")
-    bpy.ops.render.render(write_still=True)
-    picture = bpy.data.images.load(scene.render.filepath)
-    picture.colorspace_settings.name = "Non-Color"
-    light = np.array(picture.pixels[:]).reshape(-1, 4)[:, :3]
+    light = seen(scene, folder / "picture.exr", location=place, rotation=(0, tilt, 0))[:, :3]
     spread = light.std(axis=0) / len(light) ** 0.5
     result.append([light.mean(axis=0).tolist(), spread.tolist()])
 """

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 import mitsuba_diffraction as md
 from tests.support.directions import polar
+from tests.support.lanes import interaction
 
 ANGLES = (0.0, 20.0, 40.0, 55.0, 65.0, 75.0, 80.0, 84.0, 87.0, 89.0)
 AZIMUTHS = (0.0, 37.0, 90.0, 180.0)
@@ -65,19 +65,32 @@ def furnace(surface, angles=ANGLES, azimuths=AZIMUTHS, seed=0) -> tuple[np.ndarr
     return furnace_in(surface, directions, seed)
 
 
-def furnace_in(surface, directions: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """The same for directions (n, 3)."""
+def furnace_in(
+    surface, directions: np.ndarray, seed: int, **light: object
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same for directions (n, 3); `light` as in `sent_on`."""
+    weights = sent_on(surface, directions, seed, **light)
+    return weights.mean(axis=2), weights.std(axis=2) / np.sqrt(weights.shape[2])
+
+
+def sent_on(
+    surface, directions: np.ndarray, seed: int, wavelength=None, mode="Radiance", samples=SAMPLES
+) -> np.ndarray:
+    """Weights (wavelengths, directions, samples) of what a surface sends on from directions (n, 3).
+
+    wavelength : nm, one or four; by default four at random for each direction.
+    mode : of transport; radiance is n² times as large in a dielectric, importance is not.
+    """
     count = len(directions)
-    si = dr.zeros(mi.SurfaceInteraction3f, count * SAMPLES)
-    si.wi = mi.Vector3f(np.repeat(directions, SAMPLES, axis=0).astype(np.float32).T)
     wavelengths = np.random.default_rng(seed).uniform(360.0, 830.0, (4, count))
-    if mi.is_spectral:
-        si.wavelengths = mi.Spectrum(np.repeat(wavelengths, SAMPLES, axis=1).astype(np.float32))
-    rng = mi.PCG32(count * SAMPLES, seed)
+    if wavelength is not None:
+        wavelengths[:] = np.reshape(wavelength, (-1, 1))
+    si = interaction(*(np.repeat(a, samples, axis=0) for a in (directions, wavelengths.T)))
+    rng = mi.PCG32(count * samples, seed)
     sample1, sample2 = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    weights = np.array(surface.sample(mi.BSDFContext(), si, sample1, sample2)[1])
-    weights = weights.reshape(-1, count, SAMPLES)
-    return weights.mean(axis=2), weights.std(axis=2) / np.sqrt(SAMPLES)
+    context = mi.BSDFContext(getattr(mi.TransportMode, mode))
+    weight = mi.unpolarized_spectrum(surface.sample(context, si, sample1, sample2)[1])
+    return np.array(weight, float).reshape(-1, count, samples)
 
 
 def random_directions(rng: np.random.Generator, steepest: float) -> np.ndarray:

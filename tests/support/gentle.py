@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import sigma_of
 from tests.support.directions import Array, lit_pairs, rough_patch
-from tests.support.lanes import interaction, lanes
+from tests.support.lanes import bitmap, interaction, lanes
 
 #: 4.76 × 5.28 µm, gentle, its pixels and its numbers of them unequal: nothing is symmetric.
 PATCH = rough_patch((66, 56), (0.085, 0.08), 0.08)
@@ -35,19 +35,13 @@ def pairs(n=200, seed=1, field=PATCH):
 UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]], np.float32)
 
 
-def bitmap(values: Array, **more: Any) -> dict[str, Any]:
-    """A raw bitmap of these numbers, not interpolated."""
-    data = mi.TensorXf(np.ascontiguousarray(values[..., None]))
-    return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
-
-
 def directions(degrees, raw=True, channels=3, levels=None):
     """Four directions; of an integer format, which clips, where it has so many `levels`."""
     angles = np.deg2rad(np.reshape(degrees, (2, 2, 1)))
     data = np.concatenate([np.cos(angles), np.sin(angles), 0 * angles], axis=2)[..., :channels]
     if levels:
         data = np.rint(np.clip(data, 0.0, 1.0) * levels) / levels
-    return {"type": "bitmap", "raw": raw, "data": mi.TensorXf(data.astype(np.float32))}
+    return bitmap(data, raw=raw)
 
 
 def hits(wi: Array, uv: ArrayLike, wavelengths: ArrayLike = 550.0) -> Any:

@@ -19,6 +19,7 @@ from mitsuba_diffraction.plugin import installed
 from mitsuba_diffraction.scene.orientation import TriangleMesh, write_ply
 from tests.support import ROOT
 from tests.support.command_line import Ran
+from tests.support.small_files import gltf
 
 _SOURCE = """
 #include <stdio.h>
@@ -167,7 +168,8 @@ def hostile_folder(root: Path) -> Folder:
     for name, content in SCENES.items():
         (path / f"{name}.xml").write_text(_BENIGN.format(content.replace("{private}", str(root))))
     _exported(path / "exported", "private.exr", root)
-    _gltf(path / "mesh.gltf", "../private.exr")
+    elsewhere = gltf(buffers=[{"uri": "../private.exr", "byteLength": 42}])
+    (path / "mesh.gltf").write_text(json.dumps(elsewhere))
     return Folder(path, mark, private, programs)
 
 
@@ -182,17 +184,6 @@ def _exported(folder: Path, secret: str, root: Path) -> None:
         "textures": {"a": f"../../{secret}", "b": str(root / "id_rsa"), "c": "link.exr"},
     }  # fmt: skip
     (folder / "shader.json").write_text(json.dumps(document))
-
-
-def _gltf(file: Path, buffer: str) -> None:
-    """Write a mesh whose vertices are in another file."""
-    file.write_text(json.dumps({
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "buffers": [{"uri": buffer, "byteLength": 36}],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
-    }))  # fmt: skip
 
 
 def _square() -> TriangleMesh:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
+import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from tests.support.directions import Array, as_single
+from tests.support.lanes import with_bitmaps
 from tests.support.layered import PATCH, WIDTH, load, pairs
 from tests.support.transmitting import BELOW, INDICES, SIDES, both
+from tests.support.variants import evaluate
 
 METAL = {"eta": 0.9, "k": 6.0}
 COATED = METAL | {"coat_ior": 1.58}, METAL | {"coat": 1.58}
 FILMED = METAL | {"film_ior": 1.77, "film_thickness": 250.0}, METAL | {"film": (1.77, 250.0)}
 PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}}
-SCALES = np.full((2, 2, 1), 0.7, np.float32)
 PLANE = {"model": "kirchhoff"}
 SLOPE = {"model": "small_slope"}
 PLACED = {"coherence": "surface", "place": (0.0, 0.0)}
@@ -26,6 +29,7 @@ PLACED = {"coherence": "surface", "place": (0.0, 0.0)}
 class Kind(NamedTuple):
     """Parameters of the plugin, and of the reference where it knows the kind.
 
+    Arrays are texels of a bitmap.
     `stretch` and `height` are factors on the lengths and heights that the reference is given.
     """
 
@@ -42,7 +46,7 @@ KINDS: dict[str, Kind] = {
     "coat": Kind(COATED[0], COATED[1] | SLOPE),
     "film": Kind(FILMED[0], FILMED[1] | SLOPE),
     "pigment": Kind(INDICES | {"pigment": PIGMENT}),
-    "height scales": Kind({"material": "none", "height_scale": {"type": "bitmap", "raw": True}}),
+    "height scales": Kind({"material": "none", "height_scale": np.full((2, 2), 0.7)}),
     "surface": Kind({"material": "none", "coherence": "surface", "uv_scale": 10.0}, PLACED),
     "narrower": Kind(INDICES | {"lateral_scale": 0.7}, SLOPE | {"eta": 1.5}, stretch=0.7),
 }
@@ -60,6 +64,9 @@ MORE: dict[str, Kind] = {
     "one window": Kind({"material": "none", "coherence": "patch"}, {"coherence": "patch"}),
     "turned, powers of the phase": Kind(
         {"material": "none", "basis": "taylor", "orientation": 25.0, "height_scale": 0.8},
+    ),
+    "turned by a picture": Kind(
+        {"material": "none", "orientation": np.tile([0.6, 0.8, 0.0], (2, 2, 1))},
     ),
     "in its own shade": Kind(METAL | {"shadowing": "vcavity"}),
     "dielectric, tangent plane": Kind(INDICES | PLANE, PLANE | {"eta": 1.5}),
@@ -93,9 +100,7 @@ def made(kind: str, field: md.HeightField = PATCH, **more: Any) -> Any:
     if kind in THROUGH:
         return both(field, wavelength=600.0, **THROUGH[kind], **more)
     parameters = (KINDS | MORE)[kind].parameters | more
-    if kind == "height scales":
-        parameters["height_scale"] = parameters["height_scale"] | {"data": mi.TensorXf(SCALES)}
-    return load(field, wavelength=600.0, **parameters)
+    return load(field, wavelength=600.0, **with_bitmaps(parameters))
 
 
 def exact(kind: str, wi: Array, wo: Array, wavelengths: Array) -> Array | None:
@@ -124,3 +129,36 @@ def lit(kind: str, count: int) -> tuple[Array, Array, Array]:
     """Directions of light and eye, to where the kind sends light, and wavelengths (count, 4)."""
     wi, wo, lam = (part[:count] for part in pairs())
     return wi, as_single(wo * BELOW) if kind.startswith("through") else wo, lam
+
+
+def check(kind: str, count: int) -> None:
+    """Compare a kind with the reference and with itself, in the variant that is set.
+
+    `eval` and `eval_pdf` agree, components add up, samples are as dense and bright as these say.
+    """
+    wi, wo, lam = lit(kind, count)
+    lam = lam if mi.is_spectral else np.full_like(lam, 600.0)
+    samples = as_single(np.random.default_rng(2).random((len(wi), 3)))
+    bsdf = made(kind)
+    value, pdf, again, pdf_again, drawn, density, weight = evaluate(bsdf, wi, wo, samples, lam)
+    assert np.all(np.isfinite(value))
+    assert np.any(value > 0.0)
+    assert again == pytest.approx(value, rel=1e-5)
+    assert pdf_again == pytest.approx(pdf, rel=1e-5)
+    assert np.all(np.isfinite(weight))
+    assert np.all(np.isfinite(density))
+    valid = density > 0.0
+    assert np.linalg.norm(drawn[valid], axis=1) == pytest.approx(1.0, abs=1e-5)
+    there, dense, *_ = evaluate(bsdf, wi, np.where(valid[:, None], drawn, wo), samples, lam)
+    assert density[valid] == pytest.approx(dense[valid], rel=1e-3)
+    product = (weight * density[:, None])[valid]
+    assert product == pytest.approx(there[valid], rel=2e-3, abs=1e-5 * np.abs(there).max())
+    if not dr.is_jit_v(mi.Float):  # each component would be another kernel
+        components = range(bsdf.component_count())
+        parts = [evaluate(bsdf, wi, wo, samples, lam, component)[0] for component in components]
+        assert sum(parts) == pytest.approx(value, rel=1e-5)
+        assert kind not in THROUGH or not parts[0].any()  # which is what is reflected
+    expected = None if mi.is_rgb else exact(kind, wi, wo, lam if mi.is_spectral else lam[:, :1])
+    if expected is not None:
+        # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+        assert value == pytest.approx(expected, rel=1e-3, abs=1e-5 * expected.max())

@@ -49,6 +49,21 @@ def interaction(wi: ArrayLike, wavelengths: ArrayLike) -> Any:
     return si
 
 
+def bitmap(values: ArrayLike, **more: Any) -> dict[str, Any]:
+    """A raw bitmap of numbers (height, width) or (height, width, channels), not interpolated."""
+    texels = np.asarray(values, np.float32)
+    texels = texels[..., None] if texels.ndim == 2 else texels
+    data = mi.TensorXf(np.ascontiguousarray(texels))
+    return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
+
+
+def with_bitmaps(value: Any, **more: Any) -> Any:
+    """Replace arrays of texels in a dictionary by bitmaps of the variant that is set."""
+    if isinstance(value, dict):
+        return {name: with_bitmaps(part, **more) for name, part in value.items()}
+    return bitmap(value, **more) if isinstance(value, np.ndarray) else value
+
+
 def spectra(value: Any) -> NDArray[np.float64]:
     """Values (n, 4) of a mi.Spectrum."""
     return np.array(value, np.float64).T

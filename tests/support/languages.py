@@ -12,7 +12,7 @@ import OpenEXR
 from mitsuba_diffraction.optics.boundary import Model
 from mitsuba_diffraction.osl.formulas import patch_formulas
 from mitsuba_diffraction.realtime.glsl.formulas import formulas
-from tests.support.blender import result_of
+from tests.support.blender import PLANE, result_of
 from tests.support.formulas import COAT, Array, Pairs
 
 VERTEX = """#version 330
@@ -72,47 +72,21 @@ shader probe(string Incident = "", string Outgoing = "", float Eta = 1.0, float 
     BSDF = emission() * boundary_factor(vector(wi), vector(wo), md_of(Eta, Kappa), kappa, variance);
 }
 """
-_CODE = """
-import bpy, _cycles, numpy as np
-from pathlib import Path
+_CODE = f"""{PLANE}
 folder, result = Path(folder), []
-compiled = folder / "probe.oso"
-assert _cycles.osl_compile(str(folder / "probe.osl"), str(compiled)), "no OSL"
+shader = compiled(folder / "probe.osl")
 for n, k in indices:
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.cycles.device, scene.cycles.shading_system = "CPU", True
-    scene.cycles.samples, scene.cycles.use_denoising = 1, False
-    scene.cycles.use_adaptive_sampling = False
+    scene, material, script = with_script(shader, "BSDF", side, 1)
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
-    scene.render.resolution_x = scene.render.resolution_y = side
-    material = bpy.data.materials.new("probe")
-    tree = material.node_tree
-    tree.nodes.clear()
-    script = tree.nodes.new("ShaderNodeScript")
-    script.mode, script.filepath = "EXTERNAL", str(compiled)
-    bsdf = script.outputs.new("NodeSocketShader", "BSDF")
     values = [("String", "Incident", str(folder / "incident.exr")),
               ("String", "Outgoing", str(folder / "outgoing.exr")),
               ("Float", "Eta", n), ("Float", "Kappa", k)]
     for kind, name, value in values:
         script.inputs.new("NodeSocket" + kind, name).default_value = value
-    end = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(bsdf, end.inputs["Surface"])
     bpy.ops.mesh.primitive_plane_add(size=1, location=(0.5, 0.5, 0))
     bpy.ops.object.transform_apply()
     bpy.context.object.data.materials.append(material)
-    bpy.ops.object.camera_add(location=(0.5, 0.5, 1))
-    scene.camera = bpy.context.object
-    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 1.0
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
-    scene.render.filepath = str(folder / "picture.exr")
-    bpy.ops.render.render(write_still=True)
-    picture = bpy.data.images.load(scene.render.filepath)
-    picture.colorspace_settings.name = "Non-Color"
-    result.append(np.array(picture.pixels[:]).reshape(-1, 4)[:, 0].tolist())
+    result.append(seen(scene, folder / "picture.exr", location=(0.5, 0.5, 1))[:, 0].tolist())
 """
 
 

@@ -29,25 +29,20 @@ def grey(value: float, **parameters: Any) -> dict[str, Any]:
     return {"type": "diffuse", "reflectance": {"type": "uniform", "value": value}, **parameters}
 
 
+def camera(origin: list[float], size: int, fov: float = 40.0, **film: Any) -> dict[str, Any]:
+    """A camera that looks at the world's origin, y up, with a square film of so many pixels."""
+    to_world = mi.ScalarTransform4f().look_at(origin=origin, target=[0, 0, 0], up=[0, 1, 0])
+    film |= {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
+    return {"type": "perspective", "fov": fov, "to_world": to_world, "film": film}
+
+
 def scene(*shapes: dict[str, Any], size: int = 12, **parameters: Any) -> Any:
     """Shapes under one lamp and a sky, seen from above."""
     return mi.load_dict(
         {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 2},
-            "sensor": {
-                "type": "perspective",
-                "fov": 40,
-                "to_world": mi.ScalarTransform4f().look_at(
-                    origin=[0.0, 0.0, 4.0], target=[0, 0, 0], up=[0, 1, 0]
-                ),
-                "film": {
-                    "type": "hdrfilm",
-                    "width": size,
-                    "height": size,
-                    "rfilter": {"type": "box"},
-                },
-            },
+            "sensor": camera([0, 0, 4], size),
             "sky": {"type": "constant", "radiance": 0.3},
             "lamp": {"type": "directional", "direction": [0.1, 0.3, -1.0], "irradiance": 1.0},
             **{f"shape {n}": shape for n, shape in enumerate(shapes)},

@@ -8,9 +8,11 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import mitsuba_diffraction as md
+from tests.support.lanes import with_bitmaps
+from tests.support.plates import camera
 
 Array = NDArray[np.float64]
 
@@ -20,8 +22,9 @@ PIXELS = 8
 #: Half the step of differences, relative to a parameter's value, below the steps in which
 #: coefficients follow an index (0.01).
 STEP = 1e-3
-#: Half the step of angles, degrees, and of a film's thickness, nm: g follows it in steps of 1 nm.
-STEPS = {"orientation": 0.02, "film_thickness": 1.0}
+#: Half the step of angles, degrees, and of a film's thickness, nm or the texture's share of 300 nm:
+#: g follows it in steps of 1 nm.
+STEPS = {"orientation": 0.02, "film_thickness": 1.0, "film_thickness.data": 4e-3}
 #: Texels of bitmaps: factors or weights, and directions 10° to 25° from the tangent.
 TEXELS = np.array([[[0.8], [0.9]], [[0.95], [0.85]]])
 _ANGLES = np.radians([[10.0, 20.0], [25.0, 15.0]])
@@ -50,14 +53,20 @@ SURFACES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"orientation": 20.0, "height_scale": 0.9, "eta": 1.5, "nested.reflectance.value": 0.4},
     ),
     "coat": (
-        {"eta": 0.9, "k": 6.0, "coat_ior": 1.5},
-        {"orientation": 20.0, "height_scale": 0.9, "coat_eta": 1.5, "eta.value": 0.9,
-         "k.value": 6.0},
+        {"eta": 0.9, "k": 6.0, "coat_ior": 1.5, "lateral_scale": 1.0},
+        {"orientation": 20.0, "height_scale": 0.9, "lateral_scale": 0.9, "coat_eta": 1.5,
+         "eta.value": 0.9, "k.value": 6.0},
     ),
     "film": (
         {"eta": 0.9, "k": 6.0, "film_ior": 2.0, "film_thickness": 200.0},
         {"orientation": 20.0, "height_scale": 0.9, "film_thickness": 200.0, "film_eta": 2.0,
          "film_k": 0.05, "eta.value": 0.9, "k.value": 6.0},
+    ),
+    "textured film": (
+        {"eta": 0.9, "k": 6.0, "film_ior": 1.6, "film_thickness": TEXELS,
+         "film_thickness_max": 300.0},
+        {"orientation": 20.0, "height_scale": 0.9, "film_thickness.data": TEXELS,
+         "film_eta": 1.6, "film_k": 0.05, "eta.value": 0.9, "k.value": 6.0},
     ),
     "patch": (
         {"material": "none", "coherence": "patch", "lateral_scale": 1.0},
@@ -85,15 +94,6 @@ SURFACES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }  # fmt: skip
 
 
-def with_bitmaps(value: Any) -> Any:
-    """Replace arrays of texels in a dictionary by bitmaps, interpolated, of the current variant."""
-    if isinstance(value, dict):
-        return {name: with_bitmaps(part) for name, part in value.items()}
-    if isinstance(value, np.ndarray):
-        return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(value.astype(np.float32))}
-    return value
-
-
 def scene(bsdf: dict[str, Any]) -> Any:
     """A plate that a lamp on either side lights, sampled by its lamps alone."""
     lamps = {
@@ -105,29 +105,31 @@ def scene(bsdf: dict[str, Any]) -> Any:
         }
         for n, z in enumerate((5, -4))
     }
-    origin = mi.ScalarTransform4f().look_at(origin=[0.8, 0.2, 3.0], target=[0, 0, 0], up=[0, 1, 0])
-    film = {
-        "type": "hdrfilm",
-        "width": PIXELS,
-        "height": PIXELS,
-        "rfilter": {"type": "box"},
-        "pixel_format": "luminance" if mi.is_monochromatic else "rgb",
-    }
+    channels = "luminance" if mi.is_monochromatic else "rgb"
     return mi.load_dict(
         {
             "type": "scene",
             "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
-            "sensor": {"type": "perspective", "fov": 30, "to_world": origin, "film": film},
+            "sensor": camera([0.8, 0.2, 3.0], PIXELS, fov=30.0, pixel_format=channels),
             "plate": {"type": "rectangle", "bsdf": bsdf},
             **lamps,
         }
     )
 
 
-def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64, within: float = 0.05) -> None:
+def check(
+    bsdf: dict[str, Any],
+    at: dict[str, Any],
+    spp: int = 64,
+    within: float = 0.05,
+    along: ArrayLike = 1.0,
+    step: float | None = None,
+) -> None:
     """Compare derivatives, forward and backward, with differences of the same random numbers.
 
-    All texels of a bitmap move alike. `within` is the relative difference that is allowed.
+    within : relative difference that is allowed.
+    along : how numbers of an array move; by default all alike.
+    step : half of that of differences, for parameters without one of their own.
     """
     # look-ups of colours bend between their bins: their kinks average out
     spp = 4 * spp if mi.is_rgb else spp
@@ -151,7 +153,8 @@ def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64, within: float
         image = picture(at, (1, 2), tuple(at))
         for other, key in keys.items():
             # an array rather than a literal: one kernel serves all parameters
-            seed = 0.0 * dr.detach(parameters[key]) + (1.0 if other == name else 0.0)
+            same = dr.detach(parameters[key])
+            seed = 0.0 * same + (type(same)(along) if other == name else 0.0)
             dr.make_opaque(seed)
             dr.set_grad(parameters[key], seed)
         dr.enqueue(dr.ADMode.Forward, *(parameters[key] for key in keys.values()))
@@ -165,22 +168,25 @@ def check(bsdf: dict[str, Any], at: dict[str, Any], spp: int = 64, within: float
     dr.backward(dr.sum(image * mi.TensorXf(weights.astype(np.float32)), axis=None))
     sums = {name: float(np.sum(pixels * weights)) for name, pixels in forward.items()}
     for name, total in sums.items():
-        backward = float(np.array(dr.grad(parameters[keys[name]])).sum())
+        backward = float((np.array(dr.grad(parameters[keys[name]])) * along).sum())
         # to rounding of sums
         assert backward == pytest.approx(total, rel=2e-3, abs=2e-3 * max(map(abs, sums.values())))
 
     for name, value in at.items():
-        step = STEPS.get(name.rpartition(".")[2], STEP * float(np.mean(value)))
-        ends = [np.array(picture(at | {name: value + s * step}), np.float64) for s in (1.0, -1.0)]
-        difference = (ends[0] - ends[1]) / (2.0 * step)
+        own = (STEPS[key] for key in STEPS if name.endswith(key))
+        half = next(own, step or STEP * float(np.mean(value)))
+        moved = (value + sign * half * np.asarray(along) for sign in (1.0, -1.0))
+        ends = [np.array(picture(at | {name: numbers}), np.float64) for numbers in moved]
+        difference = (ends[0] - ends[1]) / (2.0 * half)
         # single precision of the sums
-        noise = 1e-6 * ends[0].sum() / step
+        noise = 1e-6 * ends[0].sum() / half
         # pixels that brighten and those that darken do not cancel
-        along = float(np.sum(forward[name] * np.sign(difference)))
-        assert along == pytest.approx(np.abs(difference).sum(), rel=within, abs=noise), name
+        found = float(np.sum(forward[name] * np.sign(difference)))
+        assert found == pytest.approx(np.abs(difference).sum(), rel=within, abs=noise), name
 
 
 def plate(name: str, width: float, **more: Any) -> dict[str, Any]:
     """A surface of the table above, without scales of energy, which bend at their nodes."""
     own = {"energy_conserving": False, "coherence_width": width, "tolerance": 1e-3}
-    return md.bsdf_dict(GRATING, **with_bitmaps(own | SURFACES[name][0] | more))
+    parameters = own | SURFACES[name][0] | more
+    return md.bsdf_dict(GRATING, **with_bitmaps(parameters, filter_type="bilinear"))

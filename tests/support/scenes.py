@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,21 @@ def rendered(name: str, **parameters: str) -> np.ndarray:
 
     scene = load_scene(SCENES / f"{name}.xml", SMALL | parameters)
     return np.array(mi.render(scene, seed=1))
+
+
+@contextlib.contextmanager
+def searched(folder: Path) -> Iterator[None]:
+    """Let Mitsuba look for files in this folder first."""
+    import mitsuba as mi
+
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    resolver.prepend(str(folder))
+    mi.set_file_resolver(resolver)
+    try:
+        yield
+    finally:
+        mi.set_file_resolver(before)
 
 
 def gentle_patch(folder: Path) -> dict[str, str]:

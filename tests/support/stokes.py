@@ -1,11 +1,17 @@
-"""Axes of Stokes vectors, and rotations between them."""
+"""Mueller matrices of BSDFs and of the reference, and axes of Stokes vectors."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike
 
+from mitsuba_diffraction import HeightField, reference
 from tests.support.directions import Array
+from tests.support.lanes import interaction, vectors
 
 #: Reversed light has the same s, so the other p.
 REVERSAL = np.diag([1.0, 1.0, -1.0, 1.0])
@@ -26,3 +32,36 @@ def rotation(start: Array, to: Array, direction: Array) -> Array:
     turned[:, 1, 1] = turned[:, 2, 2] = np.cos(double)
     turned[:, 1, 2], turned[:, 2, 1] = np.sin(double), -np.sin(double)
     return turned
+
+
+def matrices(
+    bsdf: Any, wi: Array, wo: Array, wavelengths: ArrayLike, mode: str = "Radiance", **where: Any
+) -> Array:
+    """f·|cosθo| of pairs (n, 3), Mueller matrices (n, wavelengths, 4, 4).
+
+    wavelengths : nm, four, or (n, 4).
+    where : further attributes of the surface interactions.
+    """
+    context = mi.BSDFContext(getattr(mi.TransportMode, mode))
+
+    def values(wi: Array, wo: Array, wavelengths: Array) -> Array:
+        si = interaction(wi, wavelengths)
+        for name, value in where.items():
+            setattr(si, name, value)
+        return np.array(bsdf.eval(context, si, vectors(wo)), float)
+
+    lam = np.broadcast_to(wavelengths, (len(wi), 4))
+    if dr.is_jit_v(mi.Float):
+        return np.moveaxis(values(wi, wo, lam), (3, 2), (0, 1))
+    return np.moveaxis(np.array([values(*one) for one in zip(wi, wo, lam, strict=True)]), 3, 1)
+
+
+def reference_matrices(
+    field: HeightField, wi: Array, wo: Array, wavelengths: ArrayLike, **model: Any
+) -> Array:
+    """The same by the reference, of light that arrives along ωo, as where radiance is followed."""
+    s_in, s_out = reference.boundary.polarisation_axes(wo, wi)
+    before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)
+    lam = np.broadcast_to(wavelengths, (len(wi), 4))
+    known = [after @ reference.mueller(field, wo, wi, one, **model) @ before for one in lam.T]
+    return np.stack(known, axis=1) * wo[:, None, 2, None, None]

@@ -7,6 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import pytest
 
 from tests.support.directions import Array
 from tests.support.lanes import interaction, vectors
@@ -19,8 +20,20 @@ def obstacle(variant: str) -> str | None:
     """Why a variant does not run on this machine, or None if it does."""
     if variant not in mi.variants():
         return f"this Mitsuba has no variant {variant}"
-    backend = dr.JitBackend.CUDA if variant.startswith("cuda") else dr.JitBackend.LLVM
-    return None if dr.has_backend(backend) else f"{variant}: Dr.Jit finds no device for it"
+    backends = {"cuda": dr.JitBackend.CUDA, "llvm": dr.JitBackend.LLVM}
+    backend = backends.get(variant.partition("_")[0])
+    if backend is None or dr.has_backend(backend):
+        return None
+    return f"{variant}: Dr.Jit finds no device for it"
+
+
+def use(*variants: str) -> str:
+    """Set the first of some variants that runs here and return it; skip the test if none does."""
+    name = next((name for name in variants if obstacle(name) is None), None)
+    if name is None:
+        pytest.skip("; ".join(filter(None, map(obstacle, variants))))
+    mi.set_variant(name)
+    return name
 
 
 #: All that this package supports and this Mitsuba has.
@@ -35,13 +48,6 @@ SOME = [
     )
     if name in ALL
 ]  # fmt: skip
-
-
-def runs(name: str) -> bool:
-    """Whether the machine runs a variant."""
-    if name.startswith("cuda"):
-        return bool(dr.has_backend(dr.JitBackend.CUDA))
-    return name.startswith("scalar") or bool(dr.has_backend(dr.JitBackend.LLVM))
 
 
 def evaluate(

@@ -11,10 +11,6 @@ from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from tests.support.directions import lit_pairs, polar
 from tests.support.patches import SMALL_SCAN, relative_error
 
-# small and coarse scans are what is tested
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-
-
 LAMP = polar(30.0, 180.0)
 #: Settings of tables that are quick to build.
 FAST = {"height_scale_max": 1.0, "wavelength_range": (440.0, 810.0)}

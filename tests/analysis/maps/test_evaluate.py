@@ -14,11 +14,7 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from tests.analysis.maps.mapped import GRATING, centres, mirror, plugin
 from tests.support.directions import rough_patch
 
-# Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
-pytestmark = [
-    pytest.mark.thorough,
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-]
+pytestmark = pytest.mark.thorough
 
 
 @pytest.mark.usefixtures("variant")

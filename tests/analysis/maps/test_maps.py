@@ -17,10 +17,7 @@ from mitsuba_diffraction import DiffractionError, HeightField, OrderTable
 from mitsuba_diffraction.analysis import maps
 from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, hemisphere
 from tests.analysis.maps.mapped import GRATING, centres, mirror, plugin
-from tests.support.variants import runs
-
-# Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+from tests.support.variants import use
 
 
 def test_the_hemisphere_s_pixels_are_those_that_it_touches():
@@ -174,8 +171,6 @@ def test_a_variant_without_wavelengths_is_refused():
     ],
 )
 def test_an_rgb_variant_has_no_other_light(asked):
-    if not runs("llvm_ad_rgb"):
-        pytest.skip("llvm_ad_rgb is not here")
-    mi.set_variant("llvm_ad_rgb")
+    use("llvm_ad_rgb")
     with pytest.raises(DiffractionError, match="whole spectrum in daylight"):
         brdf_map(mi.load_dict({"type": "diffuse"}), resolution=8, **asked)

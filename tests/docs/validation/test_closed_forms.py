@@ -26,8 +26,6 @@ def test_orders_hold_within_1e_4_up_to_75_degrees(profile, period, depth):
     assert found.table < 6e-5
 
 
-# one period of a grating is coarse or steep to the checks of measured patches
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 @pytest.mark.parametrize("profile", PROFILES)
 def test_the_renderer_s_orders_hold_within_1e_4_up_to_75_degrees(variant, profile):
     import mitsuba as mi

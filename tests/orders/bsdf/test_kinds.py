@@ -25,7 +25,6 @@ from tests.orders.kinds import (
 from tests.support.chi_square import DISPERSED, Case, chi_square
 from tests.support.directions import polar, uniform_directions
 from tests.support.lanes import evaluated, interaction, vectors
-from tests.support.transmitting import OneSide
 from tests.support.variants import evaluate
 
 #: Of kinds that interpolate more than half floats: sums of reflections with a kink at each critical
@@ -122,8 +121,8 @@ def test_in_grazing_light_order_0_alone_is_corrected():
 def test_the_density_is_that_of_the_samples(some_variant, kind, theta, side):
     # a window of three periods: lobes that overlap, and wide enough for the histogram
     width = 3.0 * min(KINDS[kind]().periods)
-    bsdf = OneSide(loaded(kind, coherence_width=width, orientation=0.0), side)
-    test = chi_square(bsdf, Case(None, theta, DISPERSED), samples=1 << 19)
+    bsdf = loaded(kind, coherence_width=width, orientation=0.0)
+    test = chi_square(bsdf, Case(None, theta, DISPERSED, side=side), samples=1 << 19)
     # 1 % for the cases of a table together; the numbers drawn are always the same
     assert test.run(0.01, 6 if kind == "block" else 2, quiet=True), test.messages
 

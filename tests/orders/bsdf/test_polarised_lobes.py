@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -14,10 +11,10 @@ from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.reference.boundary import mueller
 from mitsuba_diffraction.reference.fresnel import amplitudes
 from tests.support.directions import Array, as_single, polar
-from tests.support.lanes import interaction, vectors
+from tests.support.lanes import interaction
 from tests.support.orders import load, shallow_grating
-from tests.support.stokes import bases, rotation
-from tests.support.variants import runs
+from tests.support.stokes import bases, matrices, rotation
+from tests.support.variants import use
 
 INDEX = 0.9 + 6.0j
 LAM = np.array([510.0, 540.0, 570.0, 595.0])
@@ -36,21 +33,7 @@ kernels_alone = pytest.mark.parametrize("polarised", VARIANTS[1:], indirect=True
 @pytest.fixture(params=VARIANTS)
 def polarised(request: pytest.FixtureRequest) -> None:
     """A polarised variant, if it runs."""
-    if request.param not in mi.variants() or not runs(request.param):
-        pytest.skip(f"{request.param} does not run on this machine")
-    mi.set_variant(request.param)
-
-
-def matrices(bsdf: Any, wi: Array, wo: Array, mode: str, wavelengths: Array = LAM) -> Array:
-    """f·cosθo, (n, wavelengths, 4, 4)."""
-    context = mi.BSDFContext(getattr(mi.TransportMode, mode))
-    if dr.is_jit_v(mi.Float):
-        si = interaction(wi, np.tile(wavelengths, (len(wi), 1)))
-        found = np.array(bsdf.eval(context, si, mi.Vector3f(wo.T)), float)
-        return np.moveaxis(found, (3, 2), (0, 1))
-    pairs = zip(wi, wo, strict=True)
-    values = [bsdf.eval(context, interaction(i, wavelengths), vectors(o)) for i, o in pairs]
-    return np.moveaxis(np.array(values, float), 3, 1)
+    use(request.param)
 
 
 def normalised(values: Array) -> Array:
@@ -63,7 +46,7 @@ def test_a_flat_metal_polarises_as_mitsuba_s_conductor(polarised, mode):
     spectra = {name: {"type": "uniform", "value": v} for name, v in (("eta", 0.9), ("k", 6.0))}
     smooth = mi.load_dict({"type": "conductor", **spectra})
     mirror = load(shallow_grating(INDEX), orientation=20.0)
-    found = normalised(matrices(mirror, WI, WI * [-1, -1, 1], mode))
+    found = normalised(matrices(mirror, WI, WI * [-1, -1, 1], LAM, mode))
     si = interaction(WI, np.tile(LAM, (len(WI), 1)))
     context = mi.BSDFContext(getattr(mi.TransportMode, mode))
     weight = np.array(smooth.sample(context, si, 0.5, mi.Point2f(0.5))[1], float)
@@ -72,7 +55,7 @@ def test_a_flat_metal_polarises_as_mitsuba_s_conductor(polarised, mode):
 
 
 def test_a_table_of_efficiencies_depolarises(polarised):
-    values = matrices(load(OrderTable.mirror(0.6)), WI, WI * [-1, -1, 1], "Radiance")
+    values = matrices(load(OrderTable.mirror(0.6)), WI, WI * [-1, -1, 1], LAM)
     assert np.all(values[..., 0, 0] > 0.0)
     values[..., 0, 0] = 0.0
     assert np.all(values == 0.0)
@@ -95,7 +78,7 @@ def test_orders_of_shallow_grooves_polarise_as_the_model_of_diffraction(polarise
     wi, wo = WI[seen], wo[seen]
     wo[:, 2] = np.sqrt(1.0 - wo[:, 0] ** 2 - wo[:, 1] ** 2)
     found, expected = (
-        normalised(matrices(bsdf, wi, as_single(wo), mode, wavelengths))
+        normalised(matrices(bsdf, wi, as_single(wo), wavelengths, mode))
         for bsdf in (grating, model)
     )
     assert len(found) > 1
@@ -105,7 +88,7 @@ def test_orders_of_shallow_grooves_polarise_as_the_model_of_diffraction(polarise
 @pytest.mark.parametrize("mode", MODES)
 def test_a_metal_under_a_coat_has_the_matrices_of_both_mirrors(polarised, mode):
     bsdf = load(shallow_grating(INDEX / 1.5, superstrate=1.5), orientation=20.0)
-    values = normalised(matrices(bsdf, WI, WI * [-1, -1, 1], mode))
+    values = normalised(matrices(bsdf, WI, WI * [-1, -1, 1], LAM, mode))
     for wi, found in zip(WI, values[:, 0], strict=True):
         inside = np.sqrt(1.0 - (1.0 - wi[2] ** 2) / 1.5**2)
         face, metal = amplitudes(wi[2], 1.5), amplitudes(inside, INDEX / 1.5)

@@ -16,8 +16,6 @@ from mitsuba_diffraction.orders.solve.profiles import Profile, polygon, sinusoid
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-
 WAVELENGTH = 550.0
 #: 2π/λ, 1/µm.
 WAVENUMBER = 2e3 * np.pi / WAVELENGTH

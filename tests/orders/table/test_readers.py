@@ -81,7 +81,6 @@ def test_crossed_tables_have_light_of_two_periods_and_their_index(opened):
             assert values[a, b, c, 0, n, 0] == pytest.approx(share, rel=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 def test_listed_light_has_fresnel_s_reflectance_and_phase_in_the_file(opened):
     """M₀₀ ± M₀₁ of light across the grooves are shares of s and p; the larger one's phase."""
     settings, height = Settings((550.0, 550.0), polarised=True, resolution=8), 0.05
@@ -124,7 +123,6 @@ def test_lists_have_the_lines_of_the_csv(opened, tmp_path):
             assert np.isfinite(file[name][:]).sum() == len(lines)
 
 
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 @pytest.mark.parametrize("grooves", [True, False])
 def test_the_library_s_own_files_are_imported(grooves, tmp_path):
     """NetCDF 4, compressed, as the library writes it by default."""

@@ -31,11 +31,7 @@ from mitsuba_diffraction.scene.planning.report import wavelengths_needed
 from mitsuba_diffraction.tables import TableRequest
 from tests.support.directions import polar, rough_patch
 
-# Of coarse pixels: small tables. The plugin warns of that, and this is not about that.
-pytestmark = [
-    pytest.mark.thorough,
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
-]
+pytestmark = pytest.mark.thorough
 
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2, correlation=0.2)
 #: |ωi + ωo| in the plane is 0.42: below Nyquist's frequency at all wavelengths.

@@ -17,9 +17,6 @@ from tests.support.coarse import energy_as
 from tests.support.directions import polar, rough_patch
 from tests.support.furnace import isotropic
 
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-
-
 ALUMINIUM = 0.96 + 6.69j  # at 550 nm (Rakić 1995)
 MATERIALS = {
     "dielectric": ("small_slope", 1.5 + 0j),
