@@ -5,16 +5,16 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from mitsuba_diffraction.analysis.maps import LightDirection
+from mitsuba_diffraction.analysis.maps import brdf_map
 from mitsuba_diffraction.analysis.timing import Queries, ratio, rounds_of
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.progress import Progress, silent
@@ -76,7 +76,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
             calls[FLOOR] = bare_gathers(bsdf, queries[False])
             lanes[FLOOR] = lanes[name]
     timed = time_calls(plan, calls, "eval", progress, lanes)
-    times = timed.clock
+    times = {name: each.clock for name, each in timed.items()}
     to_rough = ratio(times[DEFAULT], times[ALUMINIUM])
     to_thesis = ratio(times[THESIS], times[DEFAULT])
     to_kirchhoff = ratio(times[DEFAULT], times[KIRCHHOFF])
@@ -112,7 +112,7 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
     timed, sections = time_calls(plan, calls, "eval, sample and pdf", progress), []
     for what, most in (("sample", 1.5), ("eval_pdf", 1.15), ("pdf", None)):
         evals = {
-            name: ratio(timed.clock[f"{what} {name}"], timed.clock[f"eval {name}"])
+            name: ratio(timed[f"{what} {name}"].clock, timed[f"eval {name}"].clock)
             for name in names
         }
         goals = {
@@ -121,7 +121,7 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
             if most is not None
         }
         title = f"{what}: {_conditions(plan, tables)}"
-        section = timed_section(title, timed.of(what), goals)
+        section = timed_section(title, called(timed, what), goals)
         for row in section.rows:
             row.values[_EVAL] = evals[row.name]
         sections.append(replace(section, columns=(*section.columns, _EVAL)))
@@ -132,25 +132,19 @@ def _queries(plan: Plan, slow: bool) -> Queries:
     return Queries.random(plan.slow_lanes if slow else plan.lanes)
 
 
-@dataclass(frozen=True)
-class Timed:
-    """Times of calls by name, in ns a lane: of the clock and of all cores; lanes and operations."""
+class Timed(NamedTuple):
+    """Times of a call in rounds, in ns a lane: of the clock and of all cores; its operations."""
 
-    clock: dict[str, list[float]]
-    processor: dict[str, list[float]]
-    lanes: dict[str, int]
-    operations: dict[str, int]
+    clock: list[float]
+    processor: list[float]
+    lanes: int
+    operations: int
 
-    def of(self, what: str) -> Timed:
-        """Return the calls whose names begin with a word, without it."""
-        parts = (self.clock, self.processor, self.lanes, self.operations)
-        start = f"{what} "
-        return Timed(
-            *(
-                {n.removeprefix(start): v for n, v in p.items() if n.startswith(start)}
-                for p in parts
-            )
-        )
+
+def called(timed: Mapping[str, Timed], what: str) -> dict[str, Timed]:
+    """Return the calls whose names begin with a word, without it."""
+    start = f"{what} "
+    return {n.removeprefix(start): each for n, each in timed.items() if n.startswith(start)}
 
 
 def time_calls(
@@ -158,21 +152,22 @@ def time_calls(
     calls: Mapping[str, Callable[[], Any]],
     what: str,
     progress: Progress,
-    lanes: dict[str, int] | None = None,
-) -> Timed:
+    lanes: Mapping[str, int] | None = None,
+) -> dict[str, Timed]:
     """Time calls in rounds.
 
     lanes : number of lanes of each call; by default the number of lanes of the plan.
     """
     lanes = lanes or dict.fromkeys(calls, plan.lanes)
-    timed = {name: partial(kernel_time, call) for name, call in calls.items()}
-    measured = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, what))
-    clock, processor = (
-        {name: [1e9 * each[n] / lanes[name] for each in taken] for name, taken in measured.items()}
-        for n in (0, 1)
-    )
-    operations = {name: kernel_operations(call) for name, call in calls.items()}
-    return Timed(clock, processor, lanes, operations)
+    kernels = {name: partial(kernel_time, call) for name, call in calls.items()}
+    measured = rounds_of(kernels, plan.rounds, lambda done, total: progress(done, total, what))
+    return {
+        name: Timed(
+            *([1e9 / lanes[name] * each[n] for each in measured[name]] for n in (0, 1)),
+            lanes[name], kernel_operations(call),
+        )
+        for name, call in calls.items()
+    }  # fmt: skip
 
 
 def _conditions(plan: Plan, tables: Tables) -> str:
@@ -185,17 +180,19 @@ def _conditions(plan: Plan, tables: Tables) -> str:
     )
 
 
-def timed_section(title: str, timed: Timed, goals: Mapping[str, Sequence[Goal]]) -> Section:
+def timed_section(
+    title: str, timed: Mapping[str, Timed], goals: Mapping[str, Sequence[Goal]]
+) -> Section:
     """Return a row for each call, with ratios to the baselines among them."""
-    baselines = {heading: name for heading, name in _BASELINES.items() if name in timed.clock}
+    baselines = {heading: name for heading, name in _BASELINES.items() if name in timed}
     rows = []
-    for name, taken in timed.clock.items():
-        values: dict[str, float | None] = {_TIMES: statistics.median(taken)}
-        values[_CPU] = statistics.median(timed.processor[name])
-        for heading, baseline in baselines.items():
-            values[heading] = ratio(taken, timed.clock[baseline])
-        values[_OPERATIONS] = timed.operations[name]
-        raw = {"ns": taken, "cpu_ns": timed.processor[name], "lanes": timed.lanes[name]}
+    for name, (clock, processor, lanes, operations) in timed.items():
+        values: dict[str, float | None] = {
+            _TIMES: statistics.median(clock), _CPU: statistics.median(processor),
+            **{heading: ratio(clock, timed[each].clock) for heading, each in baselines.items()},
+            _OPERATIONS: operations,
+        }  # fmt: skip
+        raw = {"ns": clock, "cpu_ns": processor, "lanes": lanes}
         rows.append(Row(name, values, goals.get(name, ()), raw))
     return Section(title, (_TIMES, _CPU, *baselines, _OPERATIONS), rows)
 
@@ -250,15 +247,10 @@ def _map(tables: Tables, variant: str, parameters: dict[str, Any], resolution: i
     """Linear sRGB of f (n, 3) at points of the hemisphere's disc, for all lights."""
     mi.set_variant(variant)
     bsdf = tables.bsdf("default", **parameters)
-    x, y = np.meshgrid(*[(np.arange(resolution) + 0.5) * (2.0 / resolution) - 1.0] * 2)
-    squared = x**2 + y**2
-    inside = squared < 0.97**2
-    wo = np.stack([x[inside], y[inside], np.sqrt(1.0 - squared[inside])])
-    wi = np.stack([LightDirection(*light).direction for light in _LIGHTS], axis=1)
-    si = dr.zeros(mi.SurfaceInteraction3f, wo.shape[1] * len(_LIGHTS))
-    si.wi = mi.Vector3f(np.repeat(wi, wo.shape[1], axis=1).astype(np.float32))
-    wo = np.tile(wo, len(_LIGHTS))
-    return _colours(bsdf, si, mi.Vector3f(wo.astype(np.float32))) / wo[2][:, None]
+    x = (np.arange(resolution) + 0.5) * (2.0 / resolution) - 1.0
+    inside = x**2 + x[:, None] ** 2 < 0.97**2
+    maps = (brdf_map(bsdf, *at, step=_STEP, resolution=resolution, samples=1) for at in _LIGHTS)
+    return np.concatenate([each.linear[inside] for each in maps])
 
 
 def _colours(bsdf: Any, si: Any, wo: Any) -> Any:
@@ -304,7 +296,7 @@ def _cost(plan: Plan, tables: Tables, rgb: str, spectral: str) -> Section:
         bsdf, queries = tables.bsdf("default"), Queries.random(plan.lanes)
         call = partial(bsdf.eval, mi.BSDFContext(), queries.si, queries.wo)
         timed = time_calls(plan, {variant: call}, "colours", silent)
-        nanoseconds[variant] = statistics.median(timed.clock[variant])
+        nanoseconds[variant] = statistics.median(timed[variant].clock)
     times = nanoseconds[rgb] / nanoseconds[spectral]
     megabytes = table.nbytes / 1e6
     columns = ("MB", "s to build", "eval, ns/call", "× spectral")

@@ -4,31 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
+from docs.make.figures.pages import Seconds
 from mitsuba_diffraction.analysis.timing import kernel_records
 
 
-class KernelTime(NamedTuple):
-    """Time of the kernels of a call without tracing in Python, s.
+def kernel_time(call: Callable[[], Any]) -> Seconds:
+    """Return the time of the kernels of one call, without tracing in Python.
 
-    Attributes
-    ----------
-    seconds : on the clock.
-    cpu_seconds : of all cores together, which other processes hardly change; with their start.
+    The processors' time, with the start of kernels, is hardly changed by other processes.
     """
-
-    seconds: float
-    cpu_seconds: float
-
-
-def kernel_time(call: Callable[[], Any]) -> KernelTime:
-    """Return the time of the kernels of one call."""
     kernels, cpu_seconds = kernel_records(call)
-    return KernelTime(sum(kernel["execution_time"] for kernel in kernels) * 1e-3, cpu_seconds)
+    return Seconds(sum(kernel["execution_time"] for kernel in kernels) * 1e-3, cpu_seconds)
 
 
 def kernel_operations(call: Callable[[], Any]) -> int:

@@ -14,7 +14,7 @@ from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.progress import Progress
 
 from .contenders import ALUMINIUM
-from .evaluation import time_calls, timed_section
+from .evaluation import called, time_calls, timed_section
 from .figures import Goal, Plan, Row, Section
 from .scenes import NOISE, noise_row
 
@@ -57,14 +57,11 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
     }
     timed, sections = time_calls(plan, calls, "orders", progress), []
     for what, most in _TIMES.items():
-        times = timed.of(what)
+        times = called(timed, what)
+        rough = times[ALUMINIUM].clock
         goals = {
-            name: [
-                Goal(
-                    f"at most {most:g}× roughconductor", ratio(each, times.clock[ALUMINIUM]) <= most
-                )
-            ]
-            for name, each in times.clock.items()
+            name: [Goal(f"at most {most:g}× roughconductor", ratio(each.clock, rough) <= most)]
+            for name, each in times.items()
             if most is not None and name != ALUMINIUM
         }
         sections.append(timed_section(what, times, goals))

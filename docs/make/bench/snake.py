@@ -15,6 +15,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from docs.make.figures.pages import Seconds
 from mitsuba_diffraction.analysis.timing import ratio, rounds_of
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.scene import set_variant
@@ -22,7 +23,7 @@ from mitsuba_diffraction.scene import set_variant
 from .build import new_process
 from .contenders import Tables
 from .figures import Goal, Plan, Row, Section
-from .kernels import KernelTime, kernel_operations
+from .kernels import kernel_operations
 from .scenes import pixels_of, skin_of, snake_scene
 
 _COLUMNS = ("ms", "CPU ms", "ns/sample", "× roughconductor", "CPU, × roughconductor", "operations")
@@ -81,9 +82,9 @@ def _load(
     return {"covered": covered, "operations": operations}
 
 
-def _render(spp: int) -> KernelTime:
+def _render(spp: int) -> Seconds:
     """Return the time of a picture, with its tracing in Python."""
     start, busy = time.perf_counter(), time.process_time()
     dr.eval(mi.render(_loaded["scene"], spp=spp))
     dr.sync_thread()
-    return KernelTime(time.perf_counter() - start, time.process_time() - busy)
+    return Seconds(time.perf_counter() - start, time.process_time() - busy)

@@ -13,11 +13,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.make.figures.pages import Seconds
 from mitsuba_diffraction.arrays import Real, Single
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.scene import read_exr
 
-from .program import Seconds, run_in_blender, seconds
+from .program import run_in_blender, seconds
 from .views import View
 
 #: Program that renders views in Blender, and the script that it adds exported materials with.

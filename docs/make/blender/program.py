@@ -7,21 +7,14 @@ import re
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
+from docs.make.figures.pages import Seconds
 from mitsuba_diffraction.errors import DiffractionError
 
 #: Variable that names a Python with bpy, or a `blender` executable.
 VARIABLE = "MITSUBA_DIFFRACTION_BLENDER"
 #: Interpreter of `make blender`.
 DEFAULT = Path(__file__).parents[3] / ".venv/blender/bin/python"
-
-
-class Seconds(NamedTuple):
-    """Time of a render in seconds: of the clock, and of the processor."""
-
-    clock: float
-    processor: float
 
 
 def blender_command() -> list[str]:

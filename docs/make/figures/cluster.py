@@ -24,17 +24,10 @@ from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.scene import Stop, load_scene, render_passes, set_variant
 
 from . import pages
-from .pages import option, program
+from .pages import Seconds, option, program
 
 VARIANT, SPP = "llvm_ad_rgb", 32
 FRAMES, RUNS = 16, 5
-
-
-class Times(NamedTuple):
-    """Seconds: of the clock, and of processors."""
-
-    clock: float
-    processor: float
 
 
 def requests(frames: int) -> list[FrameRequest]:
@@ -49,7 +42,7 @@ def processor_of(client: Any) -> float:
     return time.process_time() + sum(client.run(time.process_time).values())
 
 
-def on_workers(client: Any, scene: Path, frames: int) -> Times:
+def on_workers(client: Any, scene: Path, frames: int) -> Seconds:
     """Render the film on workers; their processor time, and the client's."""
 
     set_variant(VARIANT)
@@ -60,10 +53,10 @@ def on_workers(client: Any, scene: Path, frames: int) -> Times:
         )  # fmt: skip
         start, before = time.perf_counter(), processor_of(client)
         assert len(list(film.render(Stop(), silent))) == frames
-        return Times(time.perf_counter() - start, processor_of(client) - before)
+        return Seconds(time.perf_counter() - start, processor_of(client) - before)
 
 
-def in_one_process(scene: Path, frames: int) -> Times:
+def in_one_process(scene: Path, frames: int) -> Seconds:
     """Render the film in this process with two threads."""
     import drjit as dr
 
@@ -76,14 +69,14 @@ def in_one_process(scene: Path, frames: int) -> Times:
             loaded, loaded.sensors()[0], spp=SPP, seed=0, variant=VARIANT, stop=Stop(),
             progress=silent,
         )  # fmt: skip
-    return Times(time.perf_counter() - start, time.process_time() - before)
+    return Seconds(time.perf_counter() - start, time.process_time() - before)
 
 
 class FilmTimes(NamedTuple):
     """Times of the film, of one process and of two workers, in runs by turns."""
 
-    single: list[Times]
-    workers: list[Times]
+    single: list[Seconds]
+    workers: list[Seconds]
     idle: float  # processor seconds of client, scheduler and workers in a second without work
 
     def ratios(self) -> list[float]:
@@ -102,7 +95,7 @@ def film_times(scene: Path) -> FilmTimes:
     """Render the film by turns in one process and on two workers."""
     with jobs.processes(1) as alone, connect(2) as client:
 
-        def turn(frames: int) -> tuple[Times, Times]:
+        def turn(frames: int) -> tuple[Seconds, Seconds]:
             single = alone.submit(in_one_process, scene, frames).result()
             return single, on_workers(client, scene, frames)
 

@@ -37,14 +37,12 @@ GROUPS = {
 def commands_page() -> str:
     """Return the page of all commands."""
     parsers = subparsers()
-    grouped = [name for names in GROUPS.values() for name in names]
-    left = [name for name in parsers if name not in grouped]
     sections = [
         "# Commands",
         "`--help` behind the name of a command lists all options with defaults. Made by "
         "`python -m docs.make.figures.interfaces -o docs`.",
     ]
-    for title, names in {**GROUPS, **({"More": tuple(left)} if left else {})}.items():
+    for title, names in GROUPS.items():
         rows = [
             (
                 f"`{name}`",
@@ -52,7 +50,6 @@ def commands_page() -> str:
                 parsers[name][1][:1].upper() + parsers[name][1][1:],
             )
             for name in names
-            if name in parsers
         ]
         sections += [f"## {title}", pages.table(("command", "arguments", "what it does"), rows)]
     rows = [

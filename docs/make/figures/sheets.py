@@ -13,7 +13,7 @@ import numpy as np
 
 from docs.make.validation.cases import direction
 from docs.make.validation.compare import misplaced
-from docs.make.validation.light import heights_of, light_on
+from docs.make.validation.light import heights_of, light_of
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders import solve
@@ -22,7 +22,7 @@ from mitsuba_diffraction.orders.solve.profiles import Profile, sinusoidal
 from . import pages
 from .pages import option, program
 
-_INDEX, _WIDTH, _RANGE = 1.58, 65.0, (380.0, 730.0)
+_INDEX, _WIDTH = 1.58, 65.0
 _WAVELENGTHS, _THETAS, _PHIS = (460.0, 610.0), (0.0, 30.0, 60.0), (0.0, 60.0)
 
 
@@ -57,8 +57,7 @@ def row(case: Case) -> tuple[str, ...]:
 def _missed(case: Case, theta: float, phi: float, wavelength: float) -> float:
     """Return Σ|model − solution| over Σ solution, of the transmitted orders but 0."""
     wi, period = direction(theta, phi), case.profile.period
-    grating = solve.Grating(case.profile, solve.material_of(_INDEX, _RANGE), 1.0, _RANGE, thin=True)
-    station, channel = light_on(grating, -wi[0], -wi[1], wavelength)
+    station, channel = light_of(period, 1e-3 * wavelength, _INDEX, -wi[0], -wi[1], thin=True)
     amplitudes = solve.IntegralSolver(case.profile, case.points).amplitudes(station)
     powers = solve.sheet_efficiencies(amplitudes, station)[0, channel]
     solved = powers[:, station.channels :].mean(axis=0).sum(axis=-1)

@@ -8,16 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 from docs.make.validation.cases import Case, Light, Media, Sampled, in_plane
-from docs.make.validation.light import heights_of, solved_by
+from docs.make.validation.light import heights_of, light_of, solved_by
 from docs.make.validation.model import modelled
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.orders.solve import Chandezon, IntegralSolver, Solver, Station, material_of
+from mitsuba_diffraction.orders.solve import Chandezon, IntegralSolver, Solver, material_of
 from mitsuba_diffraction.orders.solve.profiles import Profile
 
-# y of light in the plane across the grooves; at 0 exactly the two polarisations are the same
-_ALONG = 0.0
 _MODEL = "small_slope"
 
 
@@ -93,13 +91,8 @@ def through_solved(
     solver, period = solver or IntegralSolver(profile, 120), profile.period
     values = []
     for lam in 1e-3 * wavelengths:
-        extent = 2.0 * period / lam
-        fraction = 0.5 * extent % 1.0
-        channels = int(np.floor(extent - fraction)) + 1
-        indices = np.array([lam]), np.array([index + 0j]), np.array([_ALONG])
-        station = Station(extent, fraction, channels, *indices, thin=True)
-        middle = round(0.5 * extent - fraction)
-        within = channels + np.flatnonzero(station.inside == middle)[0]
+        station, middle = light_of(period, lam, index + 0j, 0.0, 0.0, thin=True)
+        within = station.channels + np.flatnonzero(station.inside == middle)[0]
         ports = (within, middle - 1) if outwards else (middle, within - 1)
         powers = np.abs(solver.amplitudes(station)[0, ports[0], :, ports[1]]) ** 2
         values.append(powers.sum(axis=-1).mean())

@@ -13,8 +13,8 @@ integral         rigorous solver of gratings: boundary integrals
 coupled_wave     rigorous solver of gratings: coupled waves in layers
 crossed          rigorous solver in two dimensions: coupled waves in layers
 rayleigh         rigorous solver in two dimensions: Rayleigh's expansion
-coated           rigorous solver of gratings under a coat
-filmed           rigorous solver of gratings under a film
+coated           gratings under a coat
+filmed           gratings under a film
 solve            all solutions of data/, computed by one command
 model            order efficiencies by the package
 compare          deviations of the package, or of another solver, from solutions

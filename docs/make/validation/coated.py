@@ -1,10 +1,9 @@
 """Rigorous solutions of coated gratings: orders that go back and forth between coat and structure.
 
-Under a clear coat of index n, thick and uneven enough that powers add up, an order m of the light
-inside is the plane wave of tangential part sinθo/n that every solver can be asked for: E[l, m] is
-the share of light coming down in order m that goes up in order l. The face transmits T_m of it and
-sends R_m back, all of it beyond the critical angle. With light T_0 coming in, the powers p that go
-up are
+Under a clear coat of index n, thick and uneven enough that powers add up, the orders inside are the
+channels between which a solver of the package has all amplitudes: E[l, m] is the share of light
+coming down in order m that goes up in order l. The face transmits T_m of it and sends R_m back, all
+of it beyond the critical angle. With light T_0 coming in, the powers p that go up are
 
     p = E (e_0 T_0 + R p) = (1 − E R)⁻¹ E e_0 T_0,   and T p leaves; R_0 of order 0 never came in.
 
@@ -15,21 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.arrays import Real, Whole
+from mitsuba_diffraction.orders.solve import Chandezon, IntegralSolver
 from mitsuba_diffraction.reference.fresnel import amplitudes
 
-from . import integral, rayleigh
-from .cases import COAT, Case, Grating, Light, Media
-from .compare import compare
-from .models import ANGLES
-from .solutions import Orders, Solutions, stored
+from .cases import COAT, Case, Grating, Light, Media, index_of
+from .compare import Comparison, compare
+from .light import light_of, profile_of
+from .solutions import Orders, stored, version
 
-#: What is solved: sinusoids as far as Rayleigh's expansion goes, and edges.
+#: What is solved: sinusoids, and edges.
 GRATINGS = (
     *(
         Grating("sinusoidal", period, depth)
@@ -41,8 +39,6 @@ GRATINGS = (
     Grating("blazed", 1.6, 0.1),
 )  # fmt: skip
 
-#: As `index_of` knows it, at wavelengths in the coat.
-_WITHIN = Media("aluminium under polycarbonate")
 #: Media by the files of solutions, named without suffix: without what the face sends back to the
 #: structure, and with it.
 COATS = {
@@ -53,28 +49,44 @@ COATS = {
 
 def name() -> str:
     """Names of the solvers."""
-    return f"{rayleigh.name()}; lamellar and blazed: {integral.name()}"
+    return f"Chandezon's method; lamellar: gratinglab {version('gratinglab')}, integral method"
 
 
 def resolutions(case: Case) -> tuple[int, int]:
-    """Coarse and fine."""
-    return 0, 1
+    """Harmonics on either side, or points on the boundary: first and finally."""
+    return (400, 560) if case.has(profile="lamellar") else (24, 32)
 
 
-def solve(case: Case, fine: int) -> Orders:
+def solve(case: Case, resolution: int) -> Orders:
     """Efficiencies of every order that leaves the coat."""
     assert isinstance(case.surface, Grating)
     orders = case.orders[:, 0]
-    inside = inner_orders(case.surface.period, case.light.wavelength, case.light.theta)
+    inside, matrices = _matrices(case.surface, case.light, resolution)
     cosine = np.sqrt(1 - case.wo(case.orders)[:, 0] ** 2)
     faces = np.abs(amplitudes(cosine, COAT)) ** 2
-    matrices = _matrices(case.surface, case.light, fine)
     outside, once = np.isin(inside, orders), case.media.once
     powers = [
         leaving(matrix, face, outside, orders, once=once)
         for matrix, face in zip(matrices, faces, strict=True)
     ]
     return Orders(case.orders, np.stack(powers, axis=1))
+
+
+@cache
+def _matrices(grating: Grating, light: Light, resolution: int) -> tuple[Whole, Real]:
+    """Orders inside the coat, and E of both polarisations, (2, inner, inner).
+
+    E is from the column's order to the row's.
+    """
+    wavelength = light.wavelength / COAT
+    index = index_of("aluminium under polycarbonate", wavelength)
+    x = -np.sin(np.radians(light.theta)) / COAT
+    station, mirror = light_of(grating.period, 1e-3 * wavelength, index, x, 0.0)
+    method = IntegralSolver if grating.profile == "lamellar" else Chandezon
+    between = method(profile_of(grating), resolution).amplitudes(station)[0]
+    powers = (np.abs(between) ** 2).sum(axis=-1)
+    # channels are numbered towards lower orders
+    return mirror - np.arange(station.channels)[::-1], powers[::-1, :, ::-1].transpose(1, 2, 0)
 
 
 def leaving(
@@ -94,59 +106,13 @@ def leaving(
     return np.asarray(out)
 
 
-def inner_orders(period: float, wavelength: float, theta: float) -> Whole:
-    """Orders that propagate inside the coat."""
-    step, sine = wavelength / 1000 / period, np.sin(np.radians(theta))
-    return np.arange(np.ceil((sine - COAT) / step), np.floor((sine + COAT) / step) + 1).astype(int)
+def compared(gratings: Sequence[Grating] = GRATINGS) -> list[Comparison]:
+    """Compare the default with the stored solutions of gratings, by `COATS`."""
+    solved = (stored(*each).where(surface=list(gratings)) for each in COATS.items())
+    return [compare(solutions, "small_slope") for solutions in solved]
 
 
-class CoatDeviation(NamedTuple):
-    """Deviation of colours of the default under a coat, for light from one angle.
-
-    theta : angle of incidence, degrees.
-    single : deviation for light that is diffracted once in the coat.
-    bounced : deviation for all light.
-    share : part of the rigorous colours that the coat's face has returned at least once.
-    """
-
-    grating: Grating
-    theta: float
-    single: float
-    bounced: float
-    share: float
-
-
-def deviations(gratings: Sequence[Grating] = GRATINGS) -> list[CoatDeviation]:
-    """Compare the default with the stored solutions of these gratings."""
-    series = []
-    for file, media in COATS.items():
-        every = stored(file, media).solved
-        solved = Solutions([s for s in every if s.case.surface in gratings])
-        series.append(compare(solved, "small_slope"))
-    compared = []
-    for grating in gratings:
-        for theta in ANGLES:
-            parts = [each.where(grating=grating, theta=theta) for each in series]
-            once, every = (float(p.rigorous[p.counted & p.coloured].sum()) for p in parts)
-            values = (part.deviation(colours=True) for part in parts)
-            compared.append(CoatDeviation(grating, theta, *values, 1 - once / every))
-    return compared
-
-
-@cache
-def _matrices(grating: Grating, light: Light, fine: int) -> Real:
-    """E of both polarisations, (2, inner, inner): from the column's order to the row's."""
-    inside = inner_orders(grating.period, light.wavelength, light.theta)
-    matrices = np.zeros((2, len(inside), len(inside)))
-    for column, order in enumerate(inside):
-        # going down in order m is light from −sin of it
-        sine = np.sin(np.radians(light.theta)) - order * light.wavelength / 1000 / grating.period
-        angle = float(np.degrees(np.arcsin(sine / COAT)))
-        case = Case(grating, Light(light.wavelength / COAT, angle), _WITHIN)
-        solver = rayleigh if grating.profile == "sinusoidal" else integral
-        reflected = solver.solve(case, solver.resolutions(case)[fine])
-        for relative, powers in zip(reflected.order[:, 0], reflected.powers, strict=True):
-            row = np.flatnonzero(inside == order + relative)
-            if len(row):
-                matrices[:, row[0], column] = powers
-    return matrices
+def returned(once: Comparison, bounced: Comparison) -> float:
+    """Part of the rigorous colours that the coat's face has sent back at least once."""
+    single, every = (part.rigorous[part.counted & part.coloured].sum() for part in (once, bounced))
+    return float(1 - single / every)

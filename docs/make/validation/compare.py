@@ -109,8 +109,8 @@ class Comparison:
         return float(self.model.sum() / self.rigorous.sum())
 
 
-#: A comparison for each (material, model).
-Sides = Mapping[tuple[str, str], Comparison]
+#: Comparisons of the same solutions, by model.
+Sides = Mapping[str, Comparison]
 
 
 def misplaced(

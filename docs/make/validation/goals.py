@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,8 +11,8 @@ import numpy as np
 from mitsuba_diffraction.arrays import Real
 
 from .cases import PROFILES, Grating
-from .compare import Comparison, Sides, angles_of, compare, gratings_of
-from .models import ANGLES, BANDS, banded, of_cells, of_colours, within
+from .compare import Comparison, Sides, angles_of, compare, gratings_of, table_of
+from .models import ANGLES, BANDS, BOTH, banded, of_colours, within
 from .solutions import Solutions
 
 #: Largest deviation of colours on keratin at 60°, by profile and band of depth/period.
@@ -35,54 +35,61 @@ class Selection:
 
     Attributes
     ----------
-    gratings : comparisons by model, for each grating.
+    sides : comparisons by model, of these gratings and others.
     """
 
     label: str
     theta: float
-    gratings: Sequence[Mapping[str, Comparison]]
+    gratings: Sequence[Grating]
+    sides: Sides
 
     def deviation(self, model: str) -> float:
         """Mean over the gratings."""
-        return float(np.mean([of_colours(by_model[model]) for by_model in self.gratings]))
+        return self._mean(model, of_colours)
 
     @property
     def change(self) -> float:
         """Change by the last refinement of the solver, in the same measure."""
-        return float(np.mean([by_model["kirchhoff"].change() for by_model in self.gratings]))
+        return self._mean("kirchhoff", Comparison.change)
 
     @property
     def gain(self) -> float:
         """Deviation of Kirchhoff minus that of the blend."""
         return self.deviation("kirchhoff") - self.deviation("small_slope")
 
+    def _mean(self, model: str, measure: Callable[[Comparison], float]) -> float:
+        return float(table_of(self.sides[model], self.gratings, [self.theta], measure).mean())
+
     def with_one_share(self) -> tuple[float, float]:
         """Share of small slope, equal for all orders, with the least deviation, which is second."""
-        by_share = [
-            [by_model["kirchhoff"].colours_of(model) for model in _by_share(by_model)]
-            for by_model in self.gratings
-        ]
+        by_share = [list(map(part.colours_of, models)) for part, models in self._shared()]
         mean = np.mean(by_share, axis=0)
         return float(_SHARES[mean.argmin()]), float(mean.min())
 
     def with_any_shares(self) -> float:
         """Deviation if each order had its own best share: the lower bound of any blend."""
         deviations = []
-        for by_model in self.gratings:
-            models, exact = _by_share(by_model), by_model["kirchhoff"].rigorous
+        for part, models in self._shared():
+            exact = part.rigorous
             nearest = np.abs(models - exact).argmin(axis=0)
-            best = models[nearest, np.arange(len(exact))]
-            deviations.append(by_model["kirchhoff"].colours_of(best))
+            deviations.append(part.colours_of(models[nearest, np.arange(len(exact))]))
         return float(np.mean(deviations))
 
+    def _shared(self) -> Iterator[tuple[Comparison, Real]]:
+        """Yield Kirchhoff's comparison of each grating, and the efficiencies by `_SHARES`."""
+        for grating in self.gratings:
+            lit = {"grating": grating, "theta": self.theta}
+            sides = {model: every.where(**lit) for model, every in self.sides.items()}
+            yield sides["kirchhoff"], _by_share(sides)
 
-def _by_share(models: Mapping[str, Comparison]) -> Real:
+
+def _by_share(sides: Sides) -> Real:
     """Efficiencies (shares, n) by `_SHARES` of small slope in every order.
 
     They are quadratic in the share s, and so given by those at s = 0, 1/2 and 1.
     """
     none, half, whole = (
-        models[name].model for name in ("kirchhoff", "half_and_half", "small_slope_alone")
+        sides[name].model for name in ("kirchhoff", "half_and_half", "small_slope_alone")
     )
     s = _SHARES[:, None]
     lower, upper = (1 - s) * (1 - 2 * s) * none, s * (2 * s - 1) * whole
@@ -103,7 +110,7 @@ def keratin_goals(sides: Sides) -> list[Goal]:
     """Goals on gratings of keratin beside what each model reaches."""
     kirchhoff, default = (
         {(profile, band): values[0] for profile, band, values in banded(part, [60.0])}
-        for part in (sides["keratin", name] for name in ("kirchhoff", "small_slope"))
+        for part in (sides[name] for name in BOTH)
     )
     return [
         Goal(*key, goal, kirchhoff[key], default[key])
@@ -112,68 +119,40 @@ def keratin_goals(sides: Sides) -> list[Goal]:
     ]
 
 
-class Cuts(NamedTuple):
-    """Mean and largest deviation of colours on cuts of scales by one model."""
-
-    mean: float
-    worst: float
-
-
-def cuts_of_scales(cells: Sides, model: str) -> Cuts | None:
-    """Deviation on cuts of scales of keratin with slope 0.2; None where none are stored."""
-    deviations = of_cells(cells["keratin", model], kind=["elaphe", "elaphe_like"], slope=0.2)
-    return Cuts(float(np.mean(deviations)), max(deviations)) if deviations else None
-
-
-def much_worse(sides: Sides, material: str) -> list[Selection]:
+def much_worse(sides: Sides) -> list[Selection]:
     """Gratings and angles that are worse than Kirchhoff by more than a tenth.
 
     Differences below the last refinement of the solver are left out.
     """
     return [
         case
-        for case in singles(models_of(sides, material))
+        for case in singles(sides)
         if -case.gain > max(case.change, 0.1 * case.deviation("kirchhoff"))
     ]
 
 
-def with_half(sides: Sides, material: str) -> dict[str, Comparison]:
-    """Comparisons of one material by model, and by equal parts of both matrices."""
-    models = models_of(sides, material)
-    half = compare(Solutions(models["kirchhoff"].solved), "half_and_half")
-    return {**models, "half_and_half": half}
+def with_half(sides: Sides) -> Sides:
+    """Comparisons by model, and by equal parts of both matrices."""
+    half = compare(Solutions(sides["kirchhoff"].solved), "half_and_half")
+    return {**sides, "half_and_half": half}
 
 
-def models_of(sides: Sides, material: str) -> dict[str, Comparison]:
-    """Comparisons of one material by model."""
-    return {model: part for (name, model), part in sides.items() if name == material}
-
-
-def singles(models: Mapping[str, Comparison]) -> list[Selection]:
-    """Every grating and angle of one material, from its comparisons by model."""
-    every = models["kirchhoff"]
+def singles(sides: Sides) -> list[Selection]:
+    """Every grating and angle of a material."""
+    every = sides["kirchhoff"]
     return [
-        _case(models, str(grating), theta, [grating])
+        Selection(str(grating), theta, [grating], sides)
         for profile in PROFILES
         for grating in gratings_of(every, profile)
         for theta in angles_of(every.where(profile=profile))
     ]
 
 
-def whole_bands(models: Mapping[str, Comparison]) -> Iterator[Selection]:
+def whole_bands(sides: Sides) -> Iterator[Selection]:
     """Every profile and band of depth/period at `models.ANGLES`."""
     for profile in PROFILES:
         for low, high in BANDS:
-            if gratings := within(models["kirchhoff"], profile, (low, high)):
+            if gratings := within(sides["kirchhoff"], profile, (low, high)):
                 for theta in ANGLES:
-                    yield _case(models, f"all {profile}, {low:g} to {high:g}", theta, gratings)
-
-
-def _case(
-    models: Mapping[str, Comparison], label: str, theta: float, gratings: Sequence[Grating]
-) -> Selection:
-    parts = [
-        {name: every.where(grating=grating, theta=theta) for name, every in models.items()}
-        for grating in gratings
-    ]
-    return Selection(label, theta, parts)
+                    label = f"all {profile}, {low:g} to {high:g}"
+                    yield Selection(label, theta, gratings, sides)

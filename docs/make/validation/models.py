@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -15,9 +15,9 @@ from .solutions import LIGHTS, Solutions
 BANDS = ((0.0, 0.03), (0.03, 0.08), (0.08, 0.13), (0.13, 0.4))
 ANGLES = (0.0, 30.0, 60.0)
 MATERIALS = ("keratin", "aluminium")
-#: Models that are compared.
+#: Models of the plugin, and all that are compared.
+BOTH = ("kirchhoff", "small_slope")
 COMPARED = ("kirchhoff", "small_slope_alone", "small_slope")
-
 
 #: Deviation of colours: unpolarised, and with the electric field along the grooves or across.
 of_colours, of_te, of_tm = (
@@ -50,13 +50,9 @@ def within(comparison: Comparison, profile: str, band: tuple[float, float]) -> l
     ]
 
 
-def compare_all(solutions: Mapping[str, Solutions]) -> Sides:
-    """Compare the models of `COMPARED` with solutions by material."""
-    return {
-        (material, model): compare(solved, model)
-        for material, solved in solutions.items()
-        for model in COMPARED
-    }
+def by_model(solutions: Solutions, models: Sequence[str] = BOTH) -> Sides:
+    """Compare models with solutions."""
+    return {model: compare(solutions, model) for model in models}
 
 
 def of_cells(comparison: Comparison, light: str | None = None, **values: object) -> list[float]:

@@ -8,11 +8,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,46 +36,6 @@ SHOWN = 530.0
 SAMPLES = 200
 
 
-class Deviation(NamedTuple):
-    """Deviation from the solver beside, in light from one direction, over `WAVELENGTHS`.
-
-    colours : of all orders but 0 that leave within 75°, as a share of their light.
-    sum : of the sum over all orders, largest.
-    """
-
-    colours: float
-    sum: float
-
-
-class Row(NamedTuple):
-    """Efficiencies of one order, by the model, the table and the solver beside."""
-
-    order: int
-    model: float
-    table: float
-    truth: float
-
-
-class Diffuse(NamedTuple):
-    """Deviation of a table from its own solver in diffuse light of all its wavelengths.
-
-    light : which light, in words.
-    colours : mean deviation of all orders but 0, as a share of their light.
-    absorbed : mean absorbed share.
-    bias : deviation of that mean, as a share of it.
-    mean, most, largest : deviation of the absorbed share, in shares of the incident light: mean,
-        the one that 95 % of directions keep, and largest.
-    """
-
-    light: str
-    colours: float
-    absorbed: float
-    bias: float
-    mean: float
-    most: float
-    largest: float
-
-
 @dataclass(frozen=True)
 class Shipped:
     """A shipped table, its recipe, and the grating."""
@@ -98,18 +57,11 @@ class Shipped:
         """Heights of one period."""
         return Sampled(heights_of(self.recipe.profile))
 
-    def deviations(self, theta: float, phi: float) -> list[Deviation]:
-        """Return the deviations of the default model and of the table; angles as `compared`."""
-        return [
-            Deviation(
-                part.deviation(colours=True),
-                max(abs(float((one.model - one.rigorous).sum())) for one in part.each()),
-            )
-            for part in self.compared(theta, phi)
-        ]
+    def side_by_side(self, theta: float, phi: float) -> Iterator[tuple[int, list[float]]]:
+        """Yield order 0 and the strongest other one, and its efficiencies at `SHOWN`.
 
-    def side_by_side(self, theta: float, phi: float) -> list[Row]:
-        """Return order 0 and the strongest other one, at `SHOWN`."""
+        They are by the default model, the table and the other solver.
+        """
         model, table = self.compared(theta, phi, (SHOWN,))
         truth, order = model.rigorous, model.order[:, 0]
         # +m and −m of light in the plane of the grooves are equal but for rounding
@@ -118,7 +70,8 @@ class Shipped:
             int(np.flatnonzero(order == 0)[0]),
             *([colours.argmax()] if colours.max() >= 0 else []),
         ]
-        return [Row(int(order[n]), model.model[n], table.model[n], truth[n]) for n in shown]
+        for n in shown:
+            yield int(order[n]), [model.model[n], table.model[n], truth[n]]
 
     def compared(
         self, theta: float, phi: float, wavelengths: Sequence[float] = WAVELENGTHS
@@ -139,17 +92,21 @@ class Shipped:
             by_table.append(np.repeat(values[:, None], 2, axis=1))
         return compare(Solutions(solved), "small_slope"), Comparison(solved, by_table)
 
-    def diffuse(self, samples: int = SAMPLES) -> list[Diffuse]:
-        """Return the deviations from the table's own solver, of each kind of light."""
+    def diffuse(self, samples: int = SAMPLES) -> Iterator[tuple[str, list[float]]]:
+        """Yield each kind of light, and the deviations from the table's own solver in it.
+
+        They are those of the colours, as a share of their light; mean absorbed share, and the
+        deviation of that mean, as a share of it; mean deviation of the absorbed share, the one that
+        95 % of directions keep, and the largest.
+        """
         most = 1.0 / self.recipe.superstrate
         if most == 1.0:
-            return [self._diffuse(samples, "all", 0.0, 1.0)]
-        return [
-            self._diffuse(samples, "through the face", 0.0, most),
-            self._diffuse(samples, "trapped by the face", most, 1.0),
-        ]
+            yield "all", self._diffuse(samples, 0.0, 1.0)
+        else:
+            yield "through the face", self._diffuse(samples, 0.0, most)
+            yield "trapped by the face", self._diffuse(samples, most, 1.0)
 
-    def _diffuse(self, samples: int, light: str, least: float, most: float) -> Diffuse:
+    def _diffuse(self, samples: int, least: float, most: float) -> list[float]:
         """Compare light of these sines, in random directions and wavelengths."""
         rng, table = np.random.default_rng(1), self.table
         radius = np.sqrt(rng.uniform(least**2, most**2, samples))
@@ -168,15 +125,11 @@ class Shipped:
             missed[n] = np.abs(values - truth)[order != 0].sum()
             colours[n] = truth[order != 0].sum()
         size = np.abs(deviation)
-        return Diffuse(
-            light,
-            float(missed.sum() / colours.sum()),
-            float(absorbed.mean()),
-            float(deviation.mean() / absorbed.mean()),
-            float(size.mean()),
-            float(np.quantile(size, 0.95)),
-            float(size.max()),
-        )
+        mean = absorbed.mean()
+        return [
+            missed.sum() / colours.sum(), mean, deviation.mean() / mean,
+            size.mean(), np.quantile(size, 0.95), size.max(),
+        ]  # fmt: skip
 
     def _by_solver(self, solver: solve.Solver, x: float, y: float, lam: float) -> dict[int, float]:
         """Return the efficiencies of all orders by the table's solver."""

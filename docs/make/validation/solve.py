@@ -2,7 +2,7 @@
 
 python -m docs.make.validation.solve perfect_integral     # minutes to an hour; extra `validation`
 python -m docs.make.validation.solve keratin_patches_rayleigh     # in two dimensions; a minute
-python -m docs.make.validation.solve coated               # under a coat; half an hour
+python -m docs.make.validation.solve coated               # under a coat; a minute
 python -m docs.make.validation.solve films                # under a film; seconds
 """
 

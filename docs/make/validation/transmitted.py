@@ -17,8 +17,8 @@ from mitsuba_diffraction.analysis.energy import sides_summary
 
 from . import rayleigh
 from .cases import FEW_WAVELENGTHS, Case, Grating, Light, Media
-from .compare import compare
-from .models import of_colours
+from .compare import Sides
+from .models import by_model
 from .solutions import Solutions, Solved
 
 #: Sinusoids whose steepest slopes are 0.03, 0.06, 0.1, 0.1 and 0.2.
@@ -29,7 +29,6 @@ GRATINGS = tuple(
 ANGLES = (0.0, 30.0, 60.0, 75.0)
 #: Azimuths of the light: across the grooves, between, along.
 AZIMUTHS = (0.0, 35.0, 90.0)
-MODELS = ("kirchhoff", "small_slope")
 #: Surfaces whose R + T is summed, by name.
 SURFACES = {
     "sinusoid 2.5/0.08 µm": partial(gratings.sinusoidal, 2.5, 0.08, periods=8),
@@ -46,30 +45,14 @@ _HARMONICS = 31
 _THROUGH = Media("keratin", through=True)
 
 
-class Deviations(NamedTuple):
-    """Deviations of colours on a grating at one azimuth, by model and then at `ANGLES`."""
-
-    grating: Grating
-    azimuth: float
-    by_model: list[list[float]]
-
-
-def deviations(chosen: Sequence[Grating] = GRATINGS) -> list[Deviations]:
-    """Compare both models on gratings at all `AZIMUTHS`, in light of two wavelengths from above."""
-    compared = []
-    for grating in chosen:
-        cases = itertools.product(FEW_WAVELENGTHS, ANGLES, AZIMUTHS)
-        solved = Solutions([_solved(Case(grating, Light(*light), _THROUGH)) for light in cases])
-        sides = [compare(solved, model) for model in MODELS]
-        for phi in AZIMUTHS:
-            values = [[of_colours(s.where(theta=t, phi=phi)) for t in ANGLES] for s in sides]
-            compared.append(Deviations(grating, phi, values))
-    return compared
-
-
-def _solved(case: Case) -> Solved:
-    orders = rayleigh.solve(case, _HARMONICS)
-    return Solved.between(case, orders, orders)
+def compared(chosen: Sequence[Grating] = GRATINGS) -> Sides:
+    """Compare both models on gratings in light of two wavelengths from above."""
+    lights = list(itertools.product(FEW_WAVELENGTHS, ANGLES, AZIMUTHS))
+    solved = []
+    for case in (Case(grating, Light(*light), _THROUGH) for grating in chosen for light in lights):
+        orders = rayleigh.solve(case, _HARMONICS)
+        solved.append(Solved.between(case, orders, orders))
+    return by_model(Solutions(solved))
 
 
 class Sums(NamedTuple):

@@ -7,8 +7,8 @@ import pytest
 
 from docs.make.validation import goals
 from docs.make.validation.cases import Grating, index_of
-from docs.make.validation.compare import Sides, compare
-from docs.make.validation.models import ANGLES, banded, compare_all
+from docs.make.validation.compare import Sides
+from docs.make.validation.models import ANGLES, BOTH, COMPARED, banded, by_model
 from docs.make.validation.solutions import Solutions, shipped
 from mitsuba_diffraction.reference import boundary, model
 
@@ -16,24 +16,29 @@ pytestmark = pytest.mark.thorough
 
 
 @pytest.fixture(scope="module")
-def sides() -> Sides:
-    return compare_all({name: shipped(name) for name in ("keratin", "aluminium")})
+def keratin() -> Sides:
+    return by_model(shipped("keratin"))
 
 
 @pytest.fixture(scope="module")
-def cases(sides) -> list[goals.Selection]:
-    return goals.singles(goals.with_half(sides, "aluminium"))
+def aluminium() -> Sides:
+    return by_model(shipped("aluminium"), COMPARED)
 
 
-def test_on_keratin_in_oblique_light_goals_are_met(sides):
-    reached = goals.keratin_goals(sides)
+@pytest.fixture(scope="module")
+def cases(aluminium) -> list[goals.Selection]:
+    return goals.singles(goals.with_half(aluminium))
+
+
+def test_on_keratin_in_oblique_light_goals_are_met(keratin):
+    reached = goals.keratin_goals(keratin)
     assert len(reached) == len(goals.KERATIN)
     for goal in reached:
         assert 0 < goal.default <= goal.goal < goal.kirchhoff
 
 
-def test_on_keratin_nothing_is_worse_than_kirchhoff_by_more_than_a_tenth(sides):
-    assert goals.much_worse(sides, "keratin") == []
+def test_on_keratin_nothing_is_worse_than_kirchhoff_by_more_than_a_tenth(keratin):
+    assert goals.much_worse(keratin) == []
 
 
 def test_on_aluminium_few_gratings_are_worse_and_by_little(cases):
@@ -47,8 +52,8 @@ def test_on_aluminium_few_gratings_are_worse_and_by_little(cases):
     assert gains.mean() > 0.005
 
 
-def test_on_aluminium_it_is_no_worse_in_any_band(sides):
-    old, new = (list(banded(sides["aluminium", name])) for name in ("kirchhoff", "small_slope"))
+def test_on_aluminium_it_is_no_worse_in_any_band(aluminium):
+    old, new = (list(banded(aluminium[name])) for name in BOTH)
     for (name, band, before), (_, _, after) in zip(old, new, strict=True):
         for theta, was, now in zip(ANGLES, before, after, strict=True):
             # Kirchhoff's errors of the two polarisations cancel: blazed 1.1/0.1 µm at 30° has 47 %
@@ -57,9 +62,9 @@ def test_on_aluminium_it_is_no_worse_in_any_band(sides):
     assert new[0][2][2] < 0.3 * old[0][2][2]  # gentle sinusoids at 60°
 
 
-def test_on_aluminium_either_polarisation_is_far_better(sides):
+def test_on_aluminium_either_polarisation_is_far_better(aluminium):
     chosen = {"profile": "sinusoidal", "period": 2.5, "theta": 60.0, "wavelength": 610.0}
-    old, new = (sides["aluminium", name].where(**chosen) for name in ("kirchhoff", "small_slope"))
+    old, new = (aluminium[name].where(**chosen) for name in BOTH)
     for depth in (0.05, 0.1, 0.2):
         for light in ("te", "tm"):
             before, after = (
@@ -74,10 +79,7 @@ def test_shares_lie_between_the_two_matrices():
         .where(grating=Grating("blazed", 1.1, 0.1), theta=30.0, wavelength=460.0)
         .solved
     )
-    models = {
-        name: compare(Solutions([solved]), name)
-        for name in ("kirchhoff", "half_and_half", "small_slope_alone")
-    }
+    models = goals.with_half(by_model(Solutions([solved]), COMPARED))
     lit = solved.case.wi, solved.wo, index_of("aluminium", 460.0)
     direct = models["kirchhoff"].model * boundary.unpolarised(model.blended(*lit, 0.25))
     direct /= boundary.unpolarised(model.kirchhoff(*lit))

@@ -8,7 +8,7 @@ import pytest
 from docs.make.validation import crossed, rayleigh
 from docs.make.validation.cases import Case, Grating, Light, Media, Sampled
 from docs.make.validation.compare import Comparison, Sides
-from docs.make.validation.models import compare_all, of_cells
+from docs.make.validation.models import by_model, of_cells
 from docs.make.validation.patches import CELLS, measured_cuts
 from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import HeightField
@@ -24,7 +24,7 @@ SLANTED = Light(550.0, float(np.degrees(np.arcsin(np.hypot(0.5, 0.3)))), 31.0)
 
 @pytest.fixture(scope="module")
 def keratin() -> Sides:
-    return compare_all({"keratin": KERATIN})
+    return by_model(KERATIN)
 
 
 @pytest.mark.parametrize("cell", CELLS.values(), ids=str)
@@ -52,8 +52,7 @@ def test_what_is_kept_of_the_measured_scale_is_what_it_gives(shared_afm):
 
 
 def test_cuts_of_scales_meet_the_goal_on_average(keratin):
-    default = keratin["keratin", "small_slope"]
-    cuts = of_cells(default, kind=["elaphe", "elaphe_like"], slope=0.2)
+    cuts = of_cells(keratin["small_slope"], kind=["elaphe", "elaphe_like"], slope=0.2)
     assert len(cuts) >= 6
     assert np.mean(cuts) < 0.07
     # the goal for each, 10 %, is missed by one, where light is diffracted twice
@@ -65,10 +64,8 @@ def deviation(part: Comparison, light: str | None = None) -> float:
 
 
 def test_sinusoids_in_any_mount_and_crossed_gratings_are_nearly_exact(keratin):
-    pairs = zip(
-        *(keratin["keratin", name].each() for name in ("small_slope", "kirchhoff")), strict=True
-    )
-    for new, old in pairs:
+    parts = (keratin[name].each() for name in ("small_slope", "kirchhoff"))
+    for new, old in zip(*parts, strict=True):
         case = new.solved[0].case
         if case.surface.kind in ("sinusoid", "crossed"):
             assert deviation(new) < 0.03, case

@@ -8,7 +8,7 @@ from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 
 from ..compare import GRAZING, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT
-from ..models import ANGLES, of_cells, of_colours
+from ..models import ANGLES, BOTH, of_cells, of_colours
 from .markdown import percent, table
 from .measurements import Measurements
 
@@ -73,7 +73,8 @@ keratin is 1.56. Light is incident across the grooves of gratings."""
 def _gratings(measured: Measurements) -> list[list[object]]:
     """Rows of sinusoids by slope, and of walls by depth."""
     rows = []
-    for material, default in measured.default.items():
+    for material, sides in measured.gratings.items():
+        default = sides["small_slope"]
         sinusoids = gratings_of(default, "sinusoidal")
         walls = [g for p in ("lamellar", "blazed") for g in gratings_of(default, p)]
         groups = {
@@ -88,10 +89,7 @@ def _gratings(measured: Measurements) -> list[list[object]]:
         }
         for name, selected in groups.items():
             if selected:
-                values = [
-                    table_of(measured.by_model[material, model], selected, ANGLES, of_colours)
-                    for model in ("kirchhoff", "small_slope")
-                ]
+                values = [table_of(sides[model], selected, ANGLES, of_colours) for model in BOTH]
                 oblique = [_mean_and_worst(v[:, 2]) for v in values]
                 steeper = [percent(float(np.nanmean(values[1][:, n]))) for n in (0, 1)]
                 rows.append([f"{material}, {name}", len(selected), *oblique, *steeper])
@@ -102,7 +100,7 @@ def _cells(measured: Measurements) -> list[list[object]]:
     rows = []
     for name, kind, slope, material in _CELLS:
         kirchhoff, *default = (
-            of_cells(measured.cells[material, model], kind=kind, slope=slope, theta=theta)
+            of_cells(measured.cells[material][model], kind=kind, slope=slope, theta=theta)
             for model, theta in (
                 ("kirchhoff", 60.0),
                 *(("small_slope", a) for a in (60.0, 0.0, 30.0)),
@@ -121,18 +119,15 @@ def _mean_and_worst(values: np.ndarray) -> str:
 
 
 def _layers(measured: Measurements) -> str:
-    gentle = [
-        deviation for deviation in measured.coats if deviation.grating.profile == "sinusoidal"
-    ]
-    coat = (max(getattr(deviation, name) for deviation in gentle) for name in ("single", "bounced"))
-    film = max(float(deviation.default.max()) for deviation in measured.films)
-    passage, bounced = map(percent, coat)
+    gentle = gratings_of(measured.coats[0], "sinusoidal")
+    tables = (table_of(part, gentle, ANGLES, of_colours) for part in measured.coats)
+    passage, bounced = (percent(float(values.max())) for values in tables)
     return f"""## Coats, films, transmitted light
 
 Largest deviation of colours in light up to 60°:
 
 - coat on sinusoids of aluminium: {passage} for light diffracted once, {bounced} with bounces.
-- film of up to 700 nm on slopes up to 0.1: {percent(film)}."""
+- film of up to 700 nm on slopes up to 0.1: {percent(measured.worst_under_films)}."""
 
 
 def _numerics() -> str:

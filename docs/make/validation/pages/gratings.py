@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 
 from .. import goals, models
-from ..cases import Grating
-from ..compare import Comparison, angles_of, gratings_of, table_of
+from ..compare import Comparison, angles_of, gratings_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, slope_limit
-from .markdown import angle, beside, percent, table
+from .markdown import angle, beside, both_models, percent, table
 from .measurements import Measurements
 
 
@@ -38,12 +39,12 @@ def _bands(measured: Measurements) -> str:
 
 Mean over the gratings, as Kirchhoff / small slope / blend.
 
-{_banded(measured, ("kirchhoff", "small_slope_alone", "small_slope"), {"": models.of_colours})}
+{_banded(measured, models.COMPARED, {"": models.of_colours})}
 
 For one polarisation, whose errors partly cancel in unpolarised light, as Kirchhoff / blend (TE: the
 electric field along the grooves):
 
-{_banded(measured, ("kirchhoff", "small_slope"), {"TE ": models.of_te, "TM ": models.of_tm})}"""
+{_banded(measured, models.BOTH, {"TE ": models.of_te, "TM ": models.of_tm})}"""
 
 
 def _banded(
@@ -54,7 +55,7 @@ def _banded(
     """Table of deviations by models, for each material, profile and range of depth/period."""
     rows = []
     for material in models.MATERIALS:
-        parts = [measured.by_model[material, name] for name in names]
+        parts = [measured.gratings[material][name] for name in names]
         columns = [
             [list(models.banded(part, models.ANGLES, measure)) for part in parts]
             for measure in measures.values()
@@ -67,20 +68,19 @@ def _banded(
 
 
 def _slopes(measured: Measurements) -> str:
-    kirchhoff, default = measured.kirchhoff, measured.default
     rows = [
         [
             f"{material}, {grating.period:g}/{grating.depth:g} µm",
             f"{grating.field.rms_slope:.3f}",
-            *_side_by_side(kirchhoff[material], default[material], grating, models.ANGLES),
+            *both_models(sides, grating, models.ANGLES),
         ]
-        for material in default
+        for material, sides in measured.gratings.items()
         for grating in sorted(
-            gratings_of(default[material], "sinusoidal"), key=lambda g: g.field.rms_slope
+            gratings_of(sides["small_slope"], "sinusoidal"), key=lambda g: g.field.rms_slope
         )
     ]
     header = ["sinusoid", "RMS slope", *map(angle, models.ANGLES)]
-    parts = list(default.values())
+    parts = list(measured.default.values())
     gentle, steep = (slope_limit(parts, error) for error in (GENTLE_ERROR, STEEP_ERROR))
     return f"""## Sinusoids by slope
 
@@ -107,10 +107,10 @@ facets."""
         rows = [
             [
                 f"{material}, {grating.period:g}/{grating.depth:g} µm",
-                *_side_by_side(measured.kirchhoff[material], part, grating, angles),
+                *both_models(sides, grating, angles),
             ]
-            for material, part in measured.default.items()
-            for grating in gratings_of(part, profile)
+            for material, sides in measured.gratings.items()
+            for grating in gratings_of(sides["small_slope"], profile)
         ]
         header = [profile.capitalize(), *map(angle, angles)]
         parts.append(table(header, rows))
@@ -118,11 +118,11 @@ facets."""
 
 
 def _aluminium(measured: Measurements) -> str:
-    by_model = goals.with_half(measured.by_model, "aluminium")
-    every = goals.singles(by_model)
+    sides = goals.with_half(measured.gratings["aluminium"])
+    every = goals.singles(sides)
     better, worse = ([c for c in every if sign * c.gain > c.change] for sign in (1, -1))
     rows = []
-    for case in [*(c for c in goals.whole_bands(by_model) if -c.gain > c.change), *worse]:
+    for case in [*(c for c in goals.whole_bands(sides) if -c.gain > c.change), *worse]:
         share, best = case.with_one_share()
         pair = case.deviation("kirchhoff"), case.deviation("small_slope")
         values = [f"{100 * x:.2f} %" for x in (*pair, case.change, best, case.with_any_shares())]
@@ -149,16 +149,16 @@ def _goals(measured: Measurements) -> str:
             *map(percent, (goal.goal, goal.kirchhoff)),
             _reached(goal.default, goal.goal),
         ]
-        for goal in goals.keratin_goals(measured.by_model)
+        for goal in goals.keratin_goals(measured.gratings["keratin"])
     ]
-    kirchhoff, default = (
-        goals.cuts_of_scales(measured.cells, model) for model in ("kirchhoff", "small_slope")
-    )
-    for n, (name, most) in enumerate((("mean", 0.07), ("worst", 0.1))):
-        if kirchhoff and default:
-            cells = [percent(most), percent(kirchhoff[n]), _reached(default[n], most)]
-            rows.append([f"keratin, cuts of scales, slope 0.2, 0° to 60°, {name}", *cells])
-    worse = goals.much_worse(measured.by_model, "keratin")
+    cells, scales = measured.cells["keratin"], ["elaphe", "elaphe_like"]
+    cuts = [models.of_cells(cells[model], kind=scales, slope=0.2) for model in models.BOTH]
+    for name, most, measure in (("mean", 0.07, np.mean), ("worst", 0.1, np.max)):
+        if cuts[0]:
+            kirchhoff, default = (float(measure(deviations)) for deviations in cuts)
+            reached = [percent(most), percent(kirchhoff), _reached(default, most)]
+            rows.append([f"keratin, cuts of scales, slope 0.2, 0° to 60°, {name}", *reached])
+    worse = goals.much_worse(measured.gratings["keratin"])
     names = ["goal", "Kirchhoff", "default"]
     return f"""## Goals
 
@@ -173,11 +173,3 @@ On keratin {len(worse)} gratings and angles are worse than Kirchhoff by more tha
 def _reached(deviation: float, goal: float) -> str:
     missed = "" if deviation <= goal else "**missed:** "
     return f"{missed}{percent(deviation)}"
-
-
-def _side_by_side(
-    first: Comparison, second: Comparison, grating: Grating, angles: Sequence[float]
-) -> list[str]:
-    """Deviations of colours by both comparisons, a cell for each angle."""
-    columns = (table_of(part, [grating], angles, models.of_colours)[0] for part in (first, second))
-    return beside(*columns)

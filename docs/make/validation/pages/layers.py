@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from ..cases import COAT
-from ..filmed import ANGLES, GRATINGS, beyond
-from .markdown import angle, beside, percent, table
+from ..cases import COAT, FEW_WAVELENGTHS, Case, Grating, Light, Media
+from ..coated import returned
+from ..compare import compare
+from ..filmed import BEYOND, FILMS, GRATINGS
+from ..models import ANGLES, of_colours
+from ..solutions import Solutions
+from ..solve import solve_case
+from .markdown import angle, both_models, percent, table
 from .measurements import Measurements
 
 
@@ -18,14 +23,12 @@ def write(measured: Measurements) -> str:
 
 
 def _coat(measured: Measurements) -> str:
-    rows = [
-        [
-            str(deviation.grating),
-            angle(deviation.theta),
-            *map(percent, (deviation.single, deviation.share, deviation.bounced)),
-        ]
-        for deviation in measured.coats
-    ]
+    rows = []
+    for grating in dict.fromkeys(solved.case.surface for solved in measured.coats[0].solved):
+        for theta in ANGLES:
+            once, bounced = (part.where(grating=grating, theta=theta) for part in measured.coats)
+            values = of_colours(once), returned(once, bounced), of_colours(bounced)
+            rows.append([grating, angle(theta), *map(percent, values)])
     header = ["grating", "incidence", "one passage", "share of the bounces", "with bounces"]
     return f"""## Under a coat
 
@@ -43,17 +46,18 @@ Much of the light diffracted twice, which the model ignores, is beyond the criti
 
 
 def _film(measured: Measurements) -> str:
-    rows = []
-    for film in measured.films:
-        for grating, *by_model in zip(GRATINGS, film.kirchhoff, film.default, strict=True):
-            rows.append([film.name, f"{grating.period:g}/{grating.depth:g} µm", *beside(*by_model)])
-    layers = [(film.name, *(film.media.film or ())) for film in measured.films]
+    rows = [
+        [film, f"{grating.period:g}/{grating.depth:g} µm", *both_models(sides, grating, ANGLES)]
+        for film, sides in measured.films.items()
+        for grating in GRATINGS
+    ]
+    layers = [(film, *(FILMS[film].film or ())) for film in measured.films]
     sizes = [[name, f"{index:g}", f"{thickness:g} nm"] for name, index, thickness in layers]
-    thick = [[f"{b.thickness:g} nm", f"2.5/{b.depth:g} µm", percent(b.deviation)] for b in beyond()]
-    worst = max(film.default.max() for film in measured.films)
+    thick = [[f"{d:g} nm", f"2.5/{h:g} µm", percent(_lacquered(d, h))] for d, h in BEYOND]
+    worst = percent(measured.worst_under_films)
     return f"""## Under a film
 
-Beside Rayleigh's expansion at both faces. The steepest slopes are 0.03 to 0.1.
+Beside Chandezon's method, with films. The steepest slopes are 0.03 to 0.1.
 
 {table(["film", "`film_ior` + i `film_k`", "`film_thickness`"], sizes)}
 
@@ -61,8 +65,16 @@ Deviation of colours as Kirchhoff / the default:
 
 {table(["film", "sinusoid", *map(angle, ANGLES)], rows)}
 
-The default deviates by at most {percent(float(worst))} ([why](../theory/layers.md#films)). Thicker
+The default deviates by at most {worst} ([why](../theory/layers.md#films)). Thicker
 films and deeper gratings deviate more; the plugin warns of thick films on rough metals.
 Lacquer at {angle(ANGLES[-1])}:
 
 {table(["`film_thickness`", "sinusoid", "deviation"], thick)}"""
+
+
+def _lacquered(thickness: float, depth: float) -> float:
+    """Deviation of the default under lacquer (nm) on a sinusoid of 2.5 µm (depth in µm)."""
+    surface, media = Grating("sinusoidal", 2.5, depth), Media("aluminium", (1.5 + 0.02j, thickness))
+    cases = [Case(surface, Light(lam, ANGLES[-1]), media) for lam in FEW_WAVELENGTHS]
+    solved = [solve_case(case, solver="films") for case in cases]
+    return of_colours(compare(Solutions(solved), "small_slope"))

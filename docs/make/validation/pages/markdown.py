@@ -8,6 +8,10 @@ from functools import partial
 
 from docs.make.figures import pages
 
+from ..cases import Grating
+from ..compare import Sides, table_of
+from ..models import BOTH, of_colours
+
 #: Table whose columns but the first are aligned to the right.
 table = partial(pages.table, right=True)
 
@@ -31,6 +35,11 @@ def angle(degrees: float) -> str:
 def beside(*columns: Iterable[float]) -> list[str]:
     """Cells with the numbers of several columns in per cent: 1 % / 2 %."""
     return [" / ".join(map(percent, values)) for values in zip(*columns, strict=True)]
+
+
+def both_models(sides: Sides, grating: Grating, angles: Sequence[float]) -> list[str]:
+    """Cells with the deviations of colours of Kirchhoff and the default, one for each angle."""
+    return beside(*(table_of(sides[name], [grating], angles, of_colours)[0] for name in BOTH))
 
 
 def joined(values: Sequence[float]) -> str:

@@ -7,9 +7,9 @@ from functools import cached_property
 
 from .. import coated, filmed, models, statistics
 from ..cases import FEW_WAVELENGTHS
-from ..compare import Comparison, Sides, compare
+from ..compare import Comparison, Sides, compare, table_of
 from ..patches import KINDS
-from ..solutions import Solutions, shipped
+from ..solutions import Solutions, shipped, stored
 
 
 @dataclass(frozen=True)
@@ -29,37 +29,49 @@ class Measurements:
         return compare(self._solutions("perfect"))
 
     @cached_property
-    def by_model(self) -> Sides:
-        """Comparison of each material and model on gratings."""
+    def gratings(self) -> dict[str, Sides]:
+        """Comparisons of each material by model, on gratings."""
         chosen = {"period": 2.5, "depth": 0.1} if self.quick else {}
-        return models.compare_all({m: self._solutions(m, **chosen) for m in models.MATERIALS})
+        return {
+            m: models.by_model(self._solutions(m, **chosen), models.COMPARED)
+            for m in models.MATERIALS
+        }
 
-    @cached_property
+    @property
     def kirchhoff(self) -> dict[str, Comparison]:
         """Kirchhoff's model on gratings, by material."""
-        return {material: self.by_model[material, "kirchhoff"] for material in models.MATERIALS}
+        return {material: sides["kirchhoff"] for material, sides in self.gratings.items()}
 
-    @cached_property
+    @property
     def default(self) -> dict[str, Comparison]:
         """Small slope on gratings, by material."""
-        return {material: self.by_model[material, "small_slope"] for material in models.MATERIALS}
+        return {material: sides["small_slope"] for material, sides in self.gratings.items()}
 
     @cached_property
-    def cells(self) -> Sides:
-        """Comparison of each material and model on cells in two dimensions."""
+    def cells(self) -> dict[str, Sides]:
+        """Comparisons of each material by model, on cells in two dimensions."""
         chosen = {"kind": KINDS[0]} if self.quick else {}
         solved = {m: shipped(m, "patches_rayleigh").where(**chosen) for m in models.MATERIALS}
-        return models.compare_all(solved)
+        return {m: models.by_model(each, models.COMPARED) for m, each in solved.items()}
 
     @cached_property
-    def coats(self) -> list[coated.CoatDeviation]:
-        """Deviations of gratings under a coat."""
-        return coated.deviations(coated.GRATINGS[: self.most(1)])
+    def coats(self) -> list[Comparison]:
+        """The default on gratings under a coat: light diffracted once, and with bounces."""
+        return coated.compared(coated.GRATINGS[: self.most(1)])
 
     @cached_property
-    def films(self) -> list[filmed.FilmDeviations]:
-        """Deviations of gratings under each film."""
-        return [filmed.deviations(film) for film in list(filmed.FILMS)[: self.most(1)]]
+    def films(self) -> dict[str, Sides]:
+        """Comparisons by model on gratings under each film."""
+        media = list(filmed.FILMS.items())[: self.most(1)]
+        return {n: models.by_model(stored(filmed.file_of(n), each)) for n, each in media}
+
+    @property
+    def worst_under_films(self) -> float:
+        """Largest deviation of the default's colours under a film."""
+        default = (sides["small_slope"] for sides in self.films.values())
+        every = filmed.GRATINGS, models.ANGLES, models.of_colours
+        tables = (table_of(part, *every) for part in default)
+        return max(float(table.max()) for table in tables)
 
     @cached_property
     def statistics(self) -> statistics.Statistics:

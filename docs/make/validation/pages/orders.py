@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from .. import orders, stacks
+from ..compare import Comparison
 from ..published import PUBLISHED, Published
 from .markdown import percent, table
 from .measurements import Measurements
@@ -16,9 +17,9 @@ def write(measured: Measurements) -> str:
     mounts = orders.MOUNTS[: measured.most(1)]
     samples = measured.most(4) or orders.SAMPLES
     diffuse = [
-        [case.name, row.light, *map(percent, row[1:])]
+        [case.name, light, *map(percent, values)]
         for case in cases
-        for row in case.diffuse(samples)
+        for light, values in case.diffuse(samples)
     ]
     header = ["table", "light", "colours", "absorbed", "bias", "mean", "95 %", "largest"]
     return f"""# Solved orders
@@ -72,20 +73,26 @@ def _deviations(cases: Sequence[orders.Shipped], mounts: Sequence[tuple[int, int
     rows = []
     for case in cases:
         for theta, phi in mounts:
-            model, solved = case.deviations(theta, phi)
-            values = (model.colours, solved.colours, model.sum, solved.sum)
-            rows.append([case.name, f"{theta}°, {phi}°", *map(percent, values)])
+            parts = case.compared(theta, phi)
+            colours = [part.deviation(colours=True) for part in parts]
+            sums = [max(map(_sum_missed, part.each())) for part in parts]
+            rows.append([case.name, f"{theta}°, {phi}°", *map(percent, (*colours, *sums))])
     header = [
         "table", "θ, φ", "colours, default", "colours, solved", "sum, default", "sum, solved",
     ]  # fmt: skip
     return table(header, rows)
 
 
+def _sum_missed(part: Comparison) -> float:
+    """Deviation of the sum over all orders."""
+    return abs(float((part.model - part.rigorous).sum()))
+
+
 def _side_by_side(cases: Sequence[orders.Shipped], mounts: Sequence[tuple[int, int]]) -> str:
     rows = []
     for case in cases:
         for theta, phi in mounts:
-            for order, *values in case.side_by_side(theta, phi):
+            for order, values in case.side_by_side(theta, phi):
                 number = f"{order}".replace("-", "−")
                 rows.append([case.name, f"{theta}°, {phi}°", number, *(f"{v:.4f}" for v in values)])
     return table(["table", "θ, φ", "order", "default", "solved", "truth"], rows)

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..cases import Case
 from ..compare import Sides
-from ..models import COMPARED, of_cells
+from ..models import ANGLES, BOTH, COMPARED, of_cells
 from ..solutions import LIGHTS
 from .markdown import angle, percent, table
 from .measurements import Measurements
-
-_MODELS = COMPARED
-_POLARISED = ("kirchhoff", "small_slope")
-_ANGLES = (0.0, 30.0, 60.0)
 
 
 def write(measured: Measurements) -> str:
     """Write the page."""
     cells = measured.cells
-    header = ["surface", "RMS slope", "nm", *map(angle, _ANGLES), "change"]
+    header = ["surface", "RMS slope", "nm", *map(angle, ANGLES), "change"]
     return f"""# Surfaces in two dimensions
 
 Deviation of colours on small periodic cells: sinusoids in conical mounts, a crossed grating, and
@@ -44,37 +39,30 @@ Light from 60°, mean over the planes of incidence, as Kirchhoff / the default.
 {table(["surface", "nm", "s", "p"], list(_polarised(cells)))}"""
 
 
-def _unpolarised(cells: Sides) -> Iterator[list[object]]:
-    for label, case, chosen in _by_surface(cells):
-        kirchhoff = cells[case.media.material, "kirchhoff"].where(**chosen)
+def _unpolarised(cells: Mapping[str, Sides]) -> Iterator[list[object]]:
+    for start, sides in _by_surface(cells):
+        kirchhoff = sides["kirchhoff"]
+        slope = f"{kirchhoff.solved[0].case.surface.slope:.2g}"
+        values = [_means(sides, COMPARED, theta=theta) for theta in ANGLES]
         change = percent(max(part.change() for part in kirchhoff.each()))
-        values = [_means(cells, case, _MODELS, theta=theta, **chosen) for theta in _ANGLES]
-        cell = case.surface
-        yield [label, f"{cell.slope:.2g}", f"{case.light.wavelength:g}", *values, change]
+        yield [start[0], slope, start[1], *values, change]
 
 
-def _polarised(cells: Sides) -> Iterator[list[object]]:
-    for label, case, chosen in _by_surface(cells):
-        values = [_means(cells, case, _POLARISED, light, theta=60.0, **chosen) for light in LIGHTS]
-        yield [label, f"{case.light.wavelength:g}", *values]
+def _polarised(cells: Mapping[str, Sides]) -> Iterator[list[object]]:
+    for start, sides in _by_surface(cells):
+        yield [*start, *(_means(sides, BOTH, light, theta=60.0) for light in LIGHTS)]
 
 
-def _by_surface(cells: Sides) -> Iterator[tuple[str, Case, dict[str, Any]]]:
-    """Name, a case and the values in common of each material, surface and wavelength."""
-    cases = [
-        s.case for (_, model), part in cells.items() for s in part.solved if model == _MODELS[0]
-    ]
-    for media, surface, wavelength in dict.fromkeys(
-        (case.media, case.surface, case.light.wavelength) for case in cases
-    ):
-        chosen = {"surface": surface, "wavelength": wavelength}
-        case = next(c for c in cases if c.has(media=media, **chosen))
-        yield f"{media.material}, {surface}", case, chosen
+def _by_surface(cells: Mapping[str, Sides]) -> Iterator[tuple[tuple[str, str], Sides]]:
+    """Name and wavelength, and the comparisons by model, of each material's surfaces."""
+    for material, sides in cells.items():
+        cases = [solved.case for solved in sides["kirchhoff"].solved]
+        for surface, lam in dict.fromkeys((case.surface, case.light.wavelength) for case in cases):
+            parts = {m: every.where(surface=surface, wavelength=lam) for m, every in sides.items()}
+            yield (f"{material}, {surface}", f"{lam:g}"), parts
 
 
-def _means(
-    cells: Sides, case: Case, models: Sequence[str], light: str | None = None, **chosen: Any
-) -> str:
+def _means(sides: Sides, models: Sequence[str], light: str | None = None, **chosen: Any) -> str:
     """Means over the planes of incidence by model."""
-    by_model = [of_cells(cells[case.media.material, model], light, **chosen) for model in models]
+    by_model = [of_cells(sides[model], light, **chosen) for model in models]
     return " / ".join(percent(float(np.mean(v))) for v in by_model) if by_model[0] else "–"

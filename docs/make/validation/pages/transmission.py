@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import groupby
 
+import numpy as np
+
 from .. import transmitted
-from ..compare import GRAZING
-from .markdown import angle, beside, percent, table
+from ..compare import GRAZING, table_of
+from ..models import of_colours
+from .markdown import angle, both_models, percent, table
 from .measurements import Measurements
 
 #: Largest depth over period of a sinusoid of slope 0.1.
@@ -26,19 +29,24 @@ def write(measured: Measurements) -> str:
 
 
 def _orders(measured: Measurements) -> str:
-    compared = transmitted.deviations(transmitted.GRATINGS[: measured.most(1)])
+    chosen = transmitted.GRATINGS[: measured.most(1)]
+    sides = transmitted.compared(chosen)
+    by_azimuth = {
+        phi: {model: part.where(phi=phi) for model, part in sides.items()}
+        for phi in transmitted.AZIMUTHS
+    }
     rows = [
-        [
-            f"{one.grating.period:g}/{one.grating.depth:g} µm",
-            angle(one.azimuth),
-            *beside(*one.by_model),
-        ]
-        for one in compared
+        [f"{grating.period:g}/{grating.depth:g} µm", angle(phi),
+         *both_models(turned, grating, transmitted.ANGLES)]
+        for grating in chosen
+        for phi, turned in by_azimuth.items()
+    ]  # fmt: skip
+    gentle = [grating for grating in chosen if grating.depth / grating.period < _GENTLE]
+    default = [
+        table_of(turned["small_slope"], gentle, transmitted.ANGLES, of_colours)
+        for turned in by_azimuth.values()
     ]
-    gentle = [
-        one.by_model[-1] for one in compared if one.grating.depth / one.grating.period < _GENTLE
-    ]
-    normal, worst = max(at[0] for at in gentle), max(max(at) for at in gentle)
+    normal, worst = float(np.max(default, axis=(0, 1))[0]), float(np.max(default))
     header = ["sinusoid", "azimuth", *map(angle, transmitted.ANGLES)]
     return f"""## Transmitted orders
 
