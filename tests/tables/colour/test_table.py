@@ -109,6 +109,17 @@ def test_the_map_of_a_patch_has_the_spectral_colours() -> None:
 
 
 @pytest.mark.thorough
+def test_the_difference_of_tables_is_that_of_orders_which_a_picture_shows() -> None:
+    """Directions beside the orders of clean grooves are a millionth as bright: 7.8 by those."""
+    y, x = np.mgrid[:400, :400] * 0.05
+    grooves = 0.05 * np.sin(2 * np.pi * (x * np.cos(0.43) + y * np.sin(0.43)) / 1.2)
+    colours = cached_colours(DiffractionTable.build(HeightField(grooves, 0.05)))
+    exact = colours.coefficients.astype(np.float32)
+    step = 2.0**-17 * np.abs(exact).max()  # as in pages
+    fewer = replace(colours, coefficients=(np.round(exact / step) * step).astype(np.float16))
+    assert 0.0 < colour_table.colour_difference(colours, fewer).mean() < 0.1
+
+
 def test_a_table_too_large_is_coarser_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(colour_table, "MAX_BYTES", 4_400_000)
     table = DiffractionTable.build(rough_patch((40, 48), (0.2, 0.25), 0.4), coherence_width=20.0)
