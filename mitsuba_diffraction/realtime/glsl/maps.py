@@ -16,7 +16,7 @@ from ...errors import DiffractionError
 from ...plugin.description import Mix, Surface
 from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
-from .packing import daylight_weights
+from .packing import colour_weights
 
 #: Wavelengths (n,) in nm, and values (n,).
 Spectrum = tuple[Real, Real]
@@ -97,7 +97,7 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
 
 def _weights(light: Spectrum) -> Real:
     """Return the matrix (36, 3) from reflectances over `_LAM` to colours under a light."""
-    return daylight_weights(_LAM, np.interp(_LAM, *light))
+    return colour_weights(_LAM, np.interp(_LAM, *light))
 
 
 def _lit(texture: Any, uv: Real, light: Spectrum) -> NDArray[np.float32]:

@@ -141,7 +141,7 @@ def pack_directions(
     return Packed((texture,), {"energy_page": 0.0}, definitions)
 
 
-def daylight_weights(wavelengths: Real, relative: Real | float = 1.0) -> Real:
+def colour_weights(wavelengths: Real, relative: Real | float = 1.0) -> Real:
     """Return the matrix (n, 3) from values over wavelengths in nm to linear sRGB under daylight.
 
     relative : spectrum (n,) of another light, relative to daylight.
@@ -200,7 +200,7 @@ def pack_conductor(wavelengths: Real, eta: Real, k: Real) -> Packed:
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
     fine = reflectances(_LAM)
-    rows[-1, :, :3] = fine.T @ daylight_weights(_LAM)
+    rows[-1, :, :3] = fine.T @ colour_weights(_LAM)
     tint = metal_tint(_LAM, fine[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),
