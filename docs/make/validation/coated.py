@@ -2,8 +2,9 @@
 
 Under a clear coat of index n, thick and uneven enough that powers add up, the orders inside are the
 channels between which a solver of the package has all amplitudes: E[l, m] is the share of light
-coming down in order m that goes up in order l. The face transmits T_m of it and sends R_m back, all
-of it beyond the critical angle. With light T_0 coming in, the powers p that go up are
+coming down in order m that goes up in order l. The face transmits the share T_m of this light and
+sends R_m back, which is 1 beyond the critical angle. With light T_0 coming in, the powers p that go
+up are
 
     p = E (e_0 T_0 + R p) = (1 − E R)⁻¹ E e_0 T_0,   and T p leaves; R_0 of order 0 never came in.
 

@@ -105,7 +105,7 @@ class Casters:
                 array.render()
 
     def visible(self, camera: Camera) -> Visible:
-        """Determine the part of the scene that a camera sees; all of it where that is empty."""
+        """Determine the part of the scene that a camera sees, or the scene where it sees none."""
         longest = max(camera.size)
         width, height = (max(1, round(_GLANCES * n / longest)) for n in camera.size)
         target = Target(self.context, width, height)

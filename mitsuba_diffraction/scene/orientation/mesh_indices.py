@@ -74,7 +74,7 @@ class Header(NamedTuple):
         return np.dtype(fields)
 
     def content(self, file: Path, shown: str) -> NDArray[np.uint8]:
-        """Return the bytes after the header; those of a text are its numbers in double precision.
+        """Return the bytes after the header; of a text, its numbers in double precision.
 
         Raises a DiffractionError if a text is not all numbers.
         """
