@@ -14,6 +14,7 @@ import numpy as np
 
 from ...images import save_figure
 from ...tables import write_channels
+from .hemisphere import inside
 from .result import BrdfMap
 
 if TYPE_CHECKING:
@@ -65,11 +66,12 @@ def draw(
         "interpolation": "nearest",
     }
     if brdf_map.xyz is None:
-        values = np.ma.masked_less(brdf_map.luminance, np.finfo(np.float32).tiny)
-        largest = float(values.max()) if values.count() else 1.0
+        values = np.ma.masked_where(~inside(len(brdf_map.luminance)), brdf_map.luminance)
+        largest = float(values.max()) or 1.0
         from matplotlib.colors import LogNorm
 
-        norm = LogNorm(largest * 10**-_DECADES, largest, clip=True)
+        lowest = largest * 10**-_DECADES
+        norm, values = LogNorm(lowest, largest), np.ma.maximum(values, lowest)  # dark, not missing
         shown = axes.imshow(values, norm=norm, cmap="inferno", **common)
         axes.patch.set_visible(False)
     else:

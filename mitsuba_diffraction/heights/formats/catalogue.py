@@ -52,7 +52,7 @@ OWN = (
     Known("image of floats, µm", (".tif", ".tiff", ".exr"), "any program", _PIXEL),
     Known("NumPy array, µm", (".npy",), "Python", _PIXEL),
     Known("text: a grid of heights, or x, y and height", (".txt", ".csv", ".tsv", ".xyz"),
-           "Gwyddion, spreadsheets, R; units and order as the header says, else µm",
+           "Gwyddion, spreadsheets, R; units and order as the header says (`# units: nm`), else µm",
            "--pixel-size, unless it has x and y or a header of Gwyddion"),
 )  # fmt: skip
 

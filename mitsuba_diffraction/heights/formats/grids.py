@@ -30,7 +30,9 @@ _SIZE = re.compile(
     rf"[#;%\s]*+(?:({_WIDTH})|{_HEIGHT})\s*+[:=]\s*+([-+.,\deE]++)\s*+(\S++)\s*+$",
     re.IGNORECASE,
 )
-_VALUES = re.compile(r"[#;%\s]*+Value units\s*+[:=]\s*+(\S++)\s*+$", re.IGNORECASE)
+_VALUES = re.compile(
+    r"[#;%\s]*+(?:(?:Value|Height|Z) )?units?\s*+[:=]\s*+(\S++)\s*+$", re.IGNORECASE
+)
 
 
 def read_npy(path: Path) -> RawHeights:
@@ -84,11 +86,11 @@ def _copied(path: Path, values: np.ndarray) -> np.ndarray:
 def read_text(path: Path) -> RawHeights:
     """Read a grid of heights: one row a line, the first line the largest y, as in an image.
 
-    Heights are in µm unless a header line says "Value units: nm"; "Width: 10 µm" and
-    "Height: 10 µm" give the size of the patch. Empty cells and "nan" are points without data.
-    Three columns are x, y and height, which have to form a regular grid; a line of names above
-    them may give their units, µm without, and another order. Separators and decimal commas are as
-    in `columns`.
+    Heights are in µm unless a header line gives their unit, "Value units: nm" or "units: nm";
+    "Width: 10 µm" and "Height: 10 µm" give the size of the patch. Empty cells and "nan" are points
+    without data. Three columns are x, y and height, which have to form a regular grid; a line of
+    names above them may give their units, µm without, and another order. Separators and decimal
+    commas are as in `columns`.
 
     Raises a DiffractionError if a cell is not a number, rows differ in length, or a unit is not a
     length.

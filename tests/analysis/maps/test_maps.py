@@ -174,3 +174,13 @@ def test_an_rgb_variant_has_no_other_light(asked):
     use("llvm_ad_rgb")
     with pytest.raises(DiffractionError, match="whole spectrum in daylight"):
         brdf_map(mi.load_dict({"type": "diffuse"}), resolution=8, **asked)
+
+
+@pytest.mark.usefixtures("variant")
+def test_dark_directions_of_one_wavelength_are_dark_not_missing():
+    from matplotlib.figure import Figure
+
+    result = brdf_map(mirror(), 0.0, wavelength=550.0, resolution=32)
+    assert (result.luminance[hemisphere.inside(32)] == 0.0).any()
+    shown = maps.draw(Figure().subplots(), result).get_array()
+    np.testing.assert_array_equal(np.ma.getmaskarray(shown), ~hemisphere.inside(32))

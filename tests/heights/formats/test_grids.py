@@ -158,3 +158,10 @@ def test_random_text_loads_or_is_one_clear_line(tmp_path, content, separator, fi
         HeightField.load(path, pixel_size=0.1, fill=fill)
     except DiffractionError as error:
         assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("line", ["Value units: nm", "Value unit: nm", "units: nm", "z unit = nm"])
+def test_a_unit_that_a_comment_states_is_that_of_the_heights(tmp_path, line):
+    file = tmp_path / "mirror.txt"
+    file.write_text(f"# {line}\n0.5 0.25\n0.75 1\n", encoding="utf-8")
+    assert HeightField.load(file, pixel_size=0.5, level="none").heights.max() == pytest.approx(1e-3)
