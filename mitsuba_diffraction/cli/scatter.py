@@ -12,7 +12,7 @@ from ..columns import save_numbers
 from ..images import save_figure
 from ..settings import TableSettings
 from ..tables.build.build import build_with
-from ..tables.powers import order_0_power
+from ..tables.powers import scattered_share
 from . import options
 from .console import Bar, say_warning
 from .report import Figures, beside, output_of
@@ -24,8 +24,8 @@ _WAVELENGTH = 632.8
 @options.command(
     "scatter", "power spectrum and scatter of a rough mirror",
     "Write the power spectral density of the heights as CSV and a picture, and print RMS, "
-    "slope, band, the total integrated scatter by Rayleigh-Rice beside that of the table, and "
-    "an ABg model, at normal incidence and over the reflectance.",
+    "slope, band, the total integrated scatter by Rayleigh-Rice (Q = R) beside that of the "
+    "table's orders, and an ABg model, at normal incidence and over the reflectance.",
     options.SOURCE,
     ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
      "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
@@ -61,11 +61,10 @@ def run(args: argparse.Namespace) -> Figures:
     rows: list[dict[str, Any]] = []
     for wavelength in args.wavelengths:
         model = abg_model(spectrum, wavelength)
-        kappa = 4e3 * np.pi / wavelength
         rows.append({
             "wavelength": wavelength,
             "tis_rayleigh_rice": rayleigh_rice_scatter(field, wavelength),
-            "tis_table": 1.0 - float(order_0_power(table, kappa)),
+            "tis_table": scattered_share(table, wavelength),
             **(dict.fromkeys(ABg._fields) if model is None else model._asdict()),
         })  # fmt: skip
     numbers = np.column_stack([spectrum.frequency, spectrum.density])

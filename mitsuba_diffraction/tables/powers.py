@@ -10,8 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..optics.geometry import wavenumber
 from .expansion import Expansion, series_sum
 from .table import DiffractionTable
+
+#: Values of κ that powers are taken at from k to 2k: of a period of theirs, and at least.
+_PER_PERIOD, _FEWEST_STEPS = 16, 16
 
 
 def series_kind(table: DiffractionTable) -> str:
@@ -59,6 +63,28 @@ def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
     if table.expansion.kind == "power":
         return np.asarray(parts[..., 0])
     return np.asarray(np.sum(parts**2, axis=-1))
+
+
+def scattered_share(table: DiffractionTable, wavelength: float) -> float:
+    """Return the share of light along the normal that a perfect mirror of these heights scatters.
+
+    Σ |a_j(κ_j)|² 4 cosθ/(1 + cosθ)² over the orders that propagate but order 0, κ_j = k (1 + cosθ):
+    the albedo of `energy.transport`, whose lobes are points here. At most 1 of small slopes.
+
+    wavelength : nm.
+    """
+    k, (last_x, last_y) = float(wavenumber(wavelength)), table.grid.last
+    x, y = np.arange(-last_x, last_x + 1), np.arange(-last_y, last_y + 1)[:, None]
+    square = 1.0 - ((x * table.spacing[0]) ** 2 + (y * table.spacing[1]) ** 2) / k**2
+    cosine = np.sqrt(np.maximum(square, 0.0))
+    cosine[last_y, last_x] = 0.0
+    steps = max(_FEWEST_STEPS, math.ceil(_PER_PERIOD * k * table.expansion.half_range / math.pi))
+    share = 0.0
+    for n, w in enumerate(np.linspace(1.0, 2.0, steps + 1)):
+        # over w², |a_j|² is nearly linear between two κ
+        here = np.maximum(1.0 - np.abs(cosine * steps - n), 0.0)
+        share += float((here * cosine * powers_at(table, k * w)).sum()) * 4.0 / w**2
+    return share
 
 
 def as_powers(table: DiffractionTable) -> DiffractionTable:

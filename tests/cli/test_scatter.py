@@ -33,8 +33,8 @@ def test_a_rough_mirror_s_spectrum_and_scatter_are_written(run, here):
     figures = json.loads((here / "figures.json").read_text())
     assert figures["rms_um"] == pytest.approx(0.003, rel=0.05)
     for row in figures["wavelengths"]:
-        # the table is scalar: without cosines, and with what roughness below λ scatters
-        assert 1.0 < row["tis_table"] / row["tis_rayleigh_rice"] < 1.5
+        # the theory is of the first power of (4πσ/λ)² = 0.006, and its window is another one
+        assert row["tis_table"] == pytest.approx(row["tis_rayleigh_rice"], rel=0.02)
         assert row["g"] == pytest.approx(2.0, abs=0.3)
 
 
@@ -50,6 +50,15 @@ def test_a_spectrum_that_no_model_fits_has_none_and_a_wrong_wavelength_is_named(
         ran = run(*asked, "--wavelength", wrong)
         assert ran.code == 2
         assert "argument --wavelength: " in ran.err
+
+
+def test_grooves_finer_than_the_wavelength_scatter_no_light(run, here):
+    """(4πσ/λ)² of all heights is 0.0016, and every order but the mirror's is evanescent."""
+    np.save("fine.npy", np.tile(0.0028 * np.cos(np.arange(400) * 2 * np.pi / 10), (400, 1)))
+    asked = ("scatter", "fine.npy", "--pixel-size", "0.04", "--periodic", "exact")
+    run(*asked, "--json", "figures.json").succeeded()
+    row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
+    assert row["tis_table"] < 1e-9
 
 
 @pytest.mark.parametrize(("slope", "said"), [(0.012, False), (0.1, True)])
