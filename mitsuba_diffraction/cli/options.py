@@ -1,7 +1,7 @@
 """Commands, declared by `command`; options that several share, and types of arguments.
 
 A value that does not fit is a usage error that quotes it. Options are rows of values; the functions
-beside them read what is given.
+beside them read the given values.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ SCENE = (
 def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
     """Return the values of -D, --assign and --preset, as `load_scene` takes them.
 
-    What is given twice is a usage error. A mesh in place of a scene is put into the studio, with
+    A value given twice is a usage error. A mesh in place of a scene is put into the studio, with
     its surface, by `put_on_stage`.
     """
     from ..scene.surfaces import MATERIAL, PRESET

@@ -113,7 +113,7 @@ def test_white_furnace_in_colours():
     mi.set_variant("llvm_ad_rgb")
     directions = random_directions(np.random.default_rng(3), 80.0)
     mean, error = furnace_in(bsdf("sawtooth", coherence_width=15.0), directions, 3)
-    # what is a mean over wavelengths is not each wavelength's
+    # a mean over wavelengths is not each wavelength's value
     assert np.all(mean <= 1.0 + 4.0 * error + 5e-3)
     assert np.median(mean) > 0.9
 

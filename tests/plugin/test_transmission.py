@@ -105,7 +105,7 @@ def test_conserved_both_sides_add_up_to_all_light(kind, theta, lengths, width):
         for e in (False, True)
     )
     use_energy_settings(before)
-    # first order gains light, and a sheet loses what is beyond its critical angle
+    # first order gains light, and a sheet loses the light beyond its critical angle
     assert np.all(raw > 1.0 + 3 * error if kind == "dielectric" else raw < 0.99 - 3 * error)
     assert np.all((0.98 - 3 * error < conserved) & (conserved < 1.001 + 3 * error))
 

@@ -157,7 +157,7 @@ def check(kind: str, count: int) -> None:
         components = range(bsdf.component_count())
         parts = [evaluate(bsdf, wi, wo, samples, lam, component)[0] for component in components]
         assert sum(parts) == pytest.approx(value, rel=1e-5)
-        assert kind not in THROUGH or not parts[0].any()  # which is what is reflected
+        assert kind not in THROUGH or not parts[0].any()  # component 0 is reflected light
     expected = None if mi.is_rgb else exact(kind, wi, wo, lam if mi.is_spectral else lam[:, :1])
     if expected is not None:
         # the table's tolerance where light is scarce; 1e-3 of every value elsewhere

@@ -28,7 +28,7 @@ from .compare import Comparison, compare
 from .light import light_of, profile_of
 from .solutions import Orders, stored, version
 
-#: What is solved: sinusoids, and edges.
+#: Profiles that are solved: sinusoids, and edges.
 GRATINGS = (
     *(
         Grating("sinusoidal", period, depth)

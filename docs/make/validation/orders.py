@@ -95,9 +95,9 @@ class Shipped:
     def diffuse(self, samples: int = SAMPLES) -> Iterator[tuple[str, list[float]]]:
         """Yield each kind of light, and the deviations from the table's own solver in it.
 
-        They are those of the colours, as a share of their light; mean absorbed share, and the
-        deviation of that mean, as a share of it; mean deviation of the absorbed share, the one that
-        95 % of directions keep, and the largest.
+        The numbers are: deviations of the colours, as a share of their light; the mean absorbed
+        share, and its deviation as a share of this mean; of the absorbed shares the mean deviation,
+        the deviation that 95 % of directions keep, and the largest.
         """
         most = 1.0 / self.recipe.superstrate
         if most == 1.0:

@@ -25,7 +25,7 @@ from .trimesh import TriangleMesh, vertex_normals
 
 # What Mitsuba says before the mistake: places in its sources, its plugins, and the file
 _LOADING = re.compile(r'^.*(?:Error while loading \w+ file "[^"]*"|plugin of type "\w+"): ')
-# Mitsuba's exceptions, text that is not UTF-8, and sizes beyond the memory
+# Errors of reading: Mitsuba's own, of text that is not UTF-8, of sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
@@ -112,7 +112,7 @@ def _load(file: Path, **options: bool) -> mi.Mesh:
             warn(f"{shown}: a vertex normal has length 0; all are rebuilt from the triangles")
             return _load(file, face_normals=True)
         triangles = None
-        # damaged content: too few numbers, or sizes that are none
+        # damaged content: too few numbers, or impossible sizes
         with contextlib.suppress(ValueError, OverflowError, MemoryError):
             triangles = triangulated_ply(file) if kind == "ply" else None
         if triangles is not None:

@@ -145,7 +145,7 @@ def test_zemax_s_file_has_f_about_the_mirror_direction(tmp_path):
 def zemax_directions(theta, rotation, azimuth, radial):
     """Directions (…, 3) at angles about the mirror direction, degrees.
 
-    Azimuth 0 leads from the mirror direction to the normal, 90 to the left of it.
+    Azimuth 0 leads from the mirror direction to the normal, 90 to the left of this line.
     """
     mirror = polar(theta, rotation)
     to_normal = polar(theta + 90.0, rotation) * -1.0

@@ -197,7 +197,7 @@ def test_random_bytes_are_one_clear_line(tmp_path, head, tail, suffix):
     for options in ({}, {"pixel_size": 0.1, "max_height": 0.5}):
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", DiffractionWarning)  # of what is overridden
+                warnings.simplefilter("ignore", DiffractionWarning)  # values that are overridden
                 HeightField.load(path, **options)
         except DiffractionError as error:
             assert "\n" not in str(error)

@@ -194,7 +194,7 @@ def test_samples_are_orders_in_their_directions_and_keep_all_light(
     ],
 )  # fmt: skip
 def test_the_orientation_has_a_derivative(variant, kind):
-    """tests/plugin/test_rendered_derivatives_thorough.py has those of grooves and sheets."""
+    """Grooves and sheets are rendered by tests/plugin/test_rendered_derivatives_thorough.py."""
     mi.set_variant(variant)
     wi, wo, _, lam = near_orders(KINDS[kind](), 60)
     bsdf, si = loaded(kind), interaction(wi, lam[:, :1])
