@@ -82,16 +82,15 @@ class ScatteredOrders:
         lobe = 1.0 / (math.sqrt(2.0) * table.sigma)
         if densest > _DENSE and lobe > NARROW * smoothing:
             finer = max(finer, 2)
+        self._least_finer, self._finer_per_k = finer, 0.0
         if table.grid.overlapping and lobe >= NARROW * smoothing:  # which smoothing would widen
-            finer = max(finer, math.ceil(smoothing / lobe))
-        rings, steps, smoothing = finer * settings.rings, finer * settings.steps, smoothing / finer
+            self._finer_per_k = smoothing / lobe / longest
+        smoothing /= self._finer(longest)
         # κ of light that stays within a dielectric is larger by the index
         scale = height_scale * densest
         reach = min(2.0 * longest, table.q_limit)
         self.mixture = order_mixture(table, scale, reach, smoothing)
         self.strong = len(self.mixture.frequency)
-        self.nodes, self._directions = quadrature(rings, steps), (rings, steps)
-        self.distance = 0.5 * math.pi / rings
         count = len(self.mixture.central)
         self._kappas = self.mixture.kappa_step * np.linspace(0.0, count - 1, _FINER * count)
         nodes = self.mixture.kappa_step * np.arange(count, dtype=np.float64)
@@ -108,9 +107,24 @@ class ScatteredOrders:
         # light that interferes goes with its root
         return self.mixture.weak > (least if self.mixture.beats is None else least**2)
 
-    def upper_nodes(self, critical_sine: float) -> Quadrature:
-        """Return directions of y > 0 on both sides of a critical angle."""
-        return quadrature(*self._directions, critical_sine, upper=True)
+    def quadrature(self, above: float, critical_sine: float | None = None) -> Quadrature:
+        """Return directions for light of a wavenumber above the surface: closer for short waves.
+
+        critical_sine : of an angle on both sides of which directions of y > 0 are.
+        """
+        settings, finer = energy_settings(), self._finer(above)
+        rings, steps = (math.ceil(finer * count) for count in (settings.rings, settings.steps))
+        if critical_sine is None:
+            return quadrature(rings, steps)
+        return quadrature(rings, steps, critical_sine, upper=True)
+
+    def distance(self, above: float) -> float:
+        """Return the angle between rings of the quadrature, rad."""
+        return 0.5 * math.pi / (self._finer(above) * energy_settings().rings)
+
+    def _finer(self, above: float) -> float:
+        """Return the factor on the resolution by which lobes are resolved at a wavenumber."""
+        return max(self._least_finer, above * self._finer_per_k)
 
     def incidence(self, grid: DirectionGrid, k: float) -> DirectionGrid:
         """Return a grid close enough for the weak orders' light of wavenumber k.
@@ -152,7 +166,7 @@ class Transport:
     ) -> None:
         self._orders, self._path = orders, path
         self.came, self.left = path.came.number, path.left.number
-        above = float(wavenumber(wavelength))
+        self._above = above = float(wavenumber(wavelength))
         self._gain = PathGain(path, orders.roughness, above, orders.height_scale)
         self._mirrored = partial(path.mirrored, k=above, sigma_0=orders.sigma_0)
         self._k = above * path.left.index  # where the light goes to
@@ -180,7 +194,7 @@ class Transport:
 
     def _order_0(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the light of order 0."""
-        if self._width_0 > _WIDE * self._orders.distance:
+        if self._width_0 > _WIDE * self._orders.distance(self._above):
             return self._order_0_everywhere(theta, phi, grid)
         shares = self._order_0_shares(theta, grid)
         mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
@@ -190,7 +204,7 @@ class Transport:
         self, theta: Real, phi: Real, grid: DirectionGrid
     ) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to order 0, which goes to all directions."""
-        nodes = self._orders.upper_nodes(self._path.left.critical_sine)
+        nodes = self._orders.quadrature(self._above, self._path.left.critical_sine)
         shares = np.concatenate(
             [self._order_0_at(theta[rows], nodes) for rows in _blocks(len(theta), len(nodes.x))]
         )
@@ -281,7 +295,7 @@ class Transport:
 
         Sums over the quadrature become sums over the grid, as seen from each azimuth.
         """
-        nodes, turns = self._orders.nodes, grid.turns(phi)
+        nodes, turns = self._orders.quadrature(self._above), grid.turns(phi)
         shape = len(theta), grid.ones.size
         kernels = []
         for offset, turned in turns.offsets:
@@ -307,7 +321,8 @@ class Transport:
 
         A page at a time stays in a processor's cache.
         """
-        mixture, k, nodes = self._orders.mixture, self._k, self._orders.nodes
+        mixture, k = self._orders.mixture, self._k
+        nodes = self._orders.quadrature(self._above)
         cos_i, sine = self._start(theta[:, None])
         rows_of = np.arange(len(theta))[:, None]
         gain = self._gain(cos_i[:, 0], rows_of, nodes.cosine, nodes.azimuth)
@@ -321,16 +336,20 @@ class Transport:
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
         scale = self._path.sign * k / mixture.pitch
-        x, y = scale * (nodes.x + sine), scale * nodes.y
-        sin, cos = np.sin(phi)[:, None], np.cos(phi)[:, None]
         rows, columns = mixture.density.shape[1:]
+        # places among thousands need no double precision, which takes six times as long
+        x, y, turn = (
+            part.astype(np.float32) for part in (scale * (nodes.x + sine), scale * nodes.y, phi)
+        )
+        sin, cos = np.sin(turn)[:, None], np.cos(turn)[:, None]
+        middle_x, middle_y = np.float32(0.5 * columns), np.float32(0.5 * rows)
         factors = []
         for density, gain in densities:
             factor = (k**2 * nodes.weights * nodes.cosine * gain).astype(np.float32)
             factors.append((density.ravel(), factor * (1.0 - upper_share), factor * upper_share))
         for n in range(len(theta)):
-            column = (cos * x[n] - sin * y + 0.5 * columns).astype(np.int32)
-            row = (sin * x[n] + cos * y + 0.5 * rows).astype(np.int32)
+            column = (cos * x[n] - sin * y + middle_x).astype(np.int32)
+            row = (sin * x[n] + cos * y + middle_y).astype(np.int32)
             np.clip(column, 0, columns - 1, out=column)
             np.clip(row, 0, rows - 1, out=row)
             index = (lower[n] * rows + row) * columns + column
