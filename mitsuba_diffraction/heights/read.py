@@ -60,8 +60,10 @@ def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
     if value is None or is_auto(value):
         return None
     if not isinstance(value, str) or value not in choices:
+        several = sum(choice in str(value) for choice in choices) > 1
         raise DiffractionError(
             f"{name}: expected one of {', '.join(map(repr, ('auto', *choices)))}, got {value!r}"
+            + (f"; {name} takes one, and HeightField.treated applies another afterwards" * several)
         )
     return value
 
@@ -110,7 +112,7 @@ class LoadOptions:
     )  # fmt: skip
     fill: str | None = parameter(
         None, partial(_choice, name="fill", choices=("none", *preprocess.FILLS)),
-        "points without data: nearest or harmonic; default: refuse them", metavar="METHOD",
+        "points without data: nearest or harmonic; none and auto: refuse them", metavar="METHOD",
     )  # fmt: skip
     level: str | None = parameter(
         None, partial(_choice, name="level", choices=("none", *LEVELS)),
@@ -222,7 +224,12 @@ def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
     if heights.base is None and heights is not raw.values:
         heights.setflags(write=False)  # nothing else refers to it: HeightField need not copy it
     history = (*notes, note) if note else notes
-    return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
+    stated = [] if options.pixel_size or not raw.sized else ["pixel_size"]
+    if options.height_unit is not None or (raw.stated and options.max_height is None):
+        stated.append("heights")
+    return HeightField(
+        heights, pixel_size, name=file.name, history=history, cut_out=True, stated=stated
+    )
 
 
 def fill_method(options: LoadOptions) -> str | None:
@@ -245,6 +252,15 @@ def _lengths(
     if pixel_size is None:
         raise _missing_lengths(shown, False, True)
     stated = raw.pixel_size
+    if not all(SHORTEST_PIXEL <= size <= LONGEST_PIXEL for size in pixel_size):
+        assumed = "" if raw.sized else " (x and y have no unit and are read as µm)"
+        metres = [1e6 * size for size in pixel_size]
+        hint = "{:g},{:g}".format(*metres) if min(metres) >= SHORTEST_PIXEL else ""
+        raise DiffractionError(
+            f"{shown} states pixels of {pixel_size[0]:.4g} x {pixel_size[1]:.4g} µm{assumed}, not "
+            f"{_PIXELS}; give pixel_size in µm, and height_unit"
+            + (f": of lengths in metres pixel_size={hint} height_unit=m" if hint else "")
+        )
     if stated is not None and not np.allclose(pixel_size, stated, rtol=_SAME_SIZE, atol=0):
         lines.append(
             f"pixel_size overrides the file's: pixels of {pixel_size[0]:.6g} x "

@@ -52,7 +52,8 @@ OWN = (
     Known("image of floats, µm", (".tif", ".tiff", ".exr"), "any program", _PIXEL),
     Known("NumPy array, µm", (".npy",), "Python", _PIXEL),
     Known("text: a grid of heights, or x, y and height", (".txt", ".csv", ".tsv", ".xyz"),
-           "Gwyddion, spreadsheets, R; units and order as the header says (`# units: nm`), else µm",
+           "Gwyddion, spreadsheets, R; units and order as the header says (`# units: nm`, "
+           "`Height [nm]`), else µm",
            "--pixel-size, unless it has x and y or a header of Gwyddion"),
 )  # fmt: skip
 
@@ -70,8 +71,8 @@ PROBES = (
     Known("BCR-STM", (".bcr", ".bcrf"), "Image Metrology SPIP"),
 )  # fmt: skip
 OPTICAL = (
-    Known("X3P", (".x3p",), "ISO 25178-72: confocal and white-light instruments"),
-    Known("SDF", (".sdf",), "ISO 25178-71"),
+    Known("X3P", (".x3p",), "ISO 25178-72: confocal and white-light instruments; first row on top"),
+    Known("SDF", (".sdf",), "ISO 25178-71; first profile on top"),
     Known("SUR, MNT", (".sur", ".mnt"), "Digital Surf, Mountains"),
     Known("PLU, PLUX", (".plu", ".plux"), "Sensofar"),
     Known("OPD, OPDx", (".opd", ".opdx"), "Wyko, Bruker"),

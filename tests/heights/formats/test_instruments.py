@@ -94,6 +94,10 @@ def test_unknown_options_name_the_choices(tmp_path, option, value):
     assert repr(value) in message
 
 
+def test_two_levels_at_once_are_told_how_to_be_two_treatments(tmp_path):
+    assert "HeightField.treated" in refusal(write(tmp_path), level="lines,quadratic")
+
+
 def test_gwyddion_files_are_read(tmp_path):
     topography = surface_topography.Topography(np.arange(20.0).reshape(5, 4), (5, 8), unit="nm")
     topography.to_gwy(str(tmp_path / "a.gwy"))
