@@ -84,7 +84,7 @@ def test_contradictions_and_unknown_units_are_refused(text, tmp_path):
     both = {"max_height": 1, "height_unit": "nm"}
     assert "without max_height" in refusal(text, **both)
     assert "grey levels" in refusal(tmp_path / "a.png", height_unit="nm", pixel_size=0.1)
-    assert "height_unit: expected a unit of length" in refusal(text, height_unit="V")
+    assert "must be a unit of length" in refusal(text, height_unit="V")
     np.save(tmp_path / "flat.npy", np.zeros((4, 4)))
     assert "is flat" in refusal(tmp_path / "flat.npy", max_height=1, pixel_size=0.1)
     assert LoadOptions.parse(height_unit="auto").height_unit is None

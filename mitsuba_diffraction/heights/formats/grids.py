@@ -19,8 +19,6 @@ from ..lengths import micrometres_of
 from ..preprocess import LARGEST_SHARE
 from . import RawHeights, first_line
 
-_BLOCK = 1 << 22  # values that are copied at a time
-
 # bytes of a text of so many points, x, y and height
 _LARGEST = 24 * 3 * MOST_PIXELS
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
@@ -68,7 +66,11 @@ def read_npy(path: Path) -> RawHeights:
                 f"{shown} has shape {values.shape}; expected two dimensions (ny, nx)"
             )
         check_pixel_count(values.shape[0], values.shape[1], shown)
-        return RawHeights(_copied(path, values))
+        # damaged files may hold signalling NaNs; `fill_missing` handles them
+        with np.errstate(invalid="ignore"):
+            heights = np.array(values, np.float64, order="C")
+        heights.setflags(write=False)  # so that a HeightField need not copy it
+        return RawHeights(heights)
     except DiffractionError:
         raise
     except (
@@ -78,19 +80,6 @@ def read_npy(path: Path) -> RawHeights:
         raise DiffractionError(
             f"{shown} is not a readable NPY file: {first_line(error)}"
         ) from error
-
-
-def _copied(path: Path, values: np.ndarray) -> np.ndarray:
-    """Copy the values to a read-only array; mapping each block anew releases the previous one."""
-    result = np.empty(values.shape, np.float64)
-    rows = max(1, _BLOCK // values.shape[1])
-    # damaged files may hold signalling NaNs; `fill_missing` handles them
-    with np.errstate(invalid="ignore"):
-        for start in range(0, len(result), rows):
-            mapped = np.load(path, mmap_mode="r", allow_pickle=False)
-            result[start : start + rows] = mapped[start : start + rows]
-    result.setflags(write=False)
-    return result
 
 
 def read_text(path: Path) -> RawHeights:
