@@ -54,6 +54,19 @@ class Parameter:
     choices: tuple[str, ...] | None = None
     type: type = float
 
+    def checked(self, name: str, value: Any) -> Any:
+        """Return a value in its type; `name` is the parameter's in the error.
+
+        Raises a DiffractionError if the value is not allowed.
+        """
+        try:
+            return self.check(value)
+        except DiffractionError:
+            raise
+        except (TypeError, ValueError, OverflowError):
+            shown = f"{value:g}" if isinstance(value, float) else quoted(value)
+            raise DiffractionError(f"{name}={shown} must be {self.must}") from None
+
     @property
     def default_text(self) -> str:
         """Default in words."""
@@ -262,9 +275,4 @@ def checked(name: str, value: Any) -> Any:
 
     Raises a DiffractionError if it is not allowed.
     """
-    described = SETTINGS[name]
-    try:
-        return described.check(value)
-    except (TypeError, ValueError, OverflowError):
-        shown = f"{value:g}" if isinstance(value, float) else quoted(value)
-        raise DiffractionError(f"{name}={shown} must be {described.must}") from None
+    return SETTINGS[name].checked(name, value)

@@ -46,6 +46,9 @@ class HeightField:
     periodic
         Whether the patch is whole periods of a surface that repeats exactly, as a grating by a
         formula. Any other patch limits the coherence width (`heights.coherence`).
+    stated
+        Lengths whose units the file states, "pixel_size" and "heights": `validity` does not ask
+        about them.
     """
 
     heights: Real
@@ -54,6 +57,7 @@ class HeightField:
     history: tuple[str, ...] = field(default=(), kw_only=True)
     cut_out: bool = field(default=False, kw_only=True)
     periodic: bool = field(default=False, kw_only=True)
+    stated: tuple[str, ...] = field(default=(), kw_only=True)
 
     # The package `heights` sets these: their modules import this class.
     load: ClassVar[Callable[..., HeightField]]  #: `source.load`: read a file
@@ -69,6 +73,7 @@ class HeightField:
         history: Iterable[str] = (),
         cut_out: bool = False,
         periodic: bool = False,
+        stated: Iterable[str] = (),
     ) -> None:
         size = pixel_size_of(pixel_size, f"{name}: pixel_size")
         if size is None:
@@ -89,6 +94,7 @@ class HeightField:
             history=tuple(history),
             cut_out=bool(cut_out),
             periodic=bool(periodic),
+            stated=tuple(stated),
         )
 
     @property

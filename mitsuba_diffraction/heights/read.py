@@ -6,7 +6,6 @@ import math
 import numbers
 import os
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from .formats.grids import read_npy, read_text
 from .formats.images import read_exr, read_image
 from .formats.instruments import read_instrument
 from .lengths import (
+    LONGEST_HEIGHT,
     LONGEST_PIXEL,
     SHORTEST_PIXEL,
     crop_of,
@@ -51,26 +51,25 @@ PERIODICS = {
 def _channel(value: object) -> str | int | None:
     """Check the name or index of a channel."""
     if isinstance(value, bool) or not isinstance(value, (str, int, type(None))):
-        raise DiffractionError(f"channel: expected a channel's name or index, got {value!r}")
+        raise ValueError
     return value
 
 
-def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
-    """Check that parameter `name` has one of its choices; "auto" leaves it to the file."""
-    if value is None or is_auto(value):
-        return None
-    if not isinstance(value, str) or value not in choices:
-        raise DiffractionError(
-            f"{name}: expected one of {', '.join(map(repr, ('auto', *choices)))}, got {value!r}"
-        )
-    return value
+def _choices(*choices: str, alone: str = "", metavar: str = "METHOD") -> dict[str, Any]:
+    """Return check and allowed values of a parameter; "auto" leaves it to the file.
 
+    alone : what to say before the choices.
+    """
 
-def _periodic(value: object) -> str | None:
-    """Check the statement about the edges; values of earlier versions state nothing."""
-    if retired_value("periodic", value):
-        return None
-    return _choice(value, "periodic", tuple(PERIODICS))
+    def check(value: object) -> str | None:
+        if value is None or is_auto(value):
+            return None
+        if not isinstance(value, str) or value not in choices:
+            raise ValueError
+        return value
+
+    must = f"{alone}one of {', '.join(map(repr, ('auto', *choices)))}"
+    return {"check": check, "must": must, "metavar": metavar}
 
 
 def _sigmas(value: object) -> float | None:
@@ -79,9 +78,7 @@ def _sigmas(value: object) -> float | None:
         return None
     sigmas = numbers_of(value) if isinstance(value, str | numbers.Real) else None
     if sigmas is None or len(sigmas) != 1 or sigmas[0] < 1.0:
-        raise DiffractionError(
-            f"clip: expected how many standard deviations to keep, at least 1, got {value!r}"
-        )
+        raise ValueError
     return sigmas[0]
 
 
@@ -95,34 +92,37 @@ class LoadOptions:
     )  # fmt: skip
     max_height: float | None = parameter(
         None, height_of, "µm, height of white in an image; other heights are scaled to span it "
-        "from end to end", metavar="H",
+        "from end to end", f"a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'", "H",
     )  # fmt: skip
     height_unit: str | None = parameter(
         None, height_unit_of, "unit of the numbers in the file, e.g. nm; overrides what it states",
-        metavar="U",
+        "a unit of length, m, cm, mm, µm, um, nm, pm or Å, or 'auto'", "U",
     )  # fmt: skip
     channel: str | int | None = parameter(
-        None, _channel, "name or index of the channel; default: the heights", metavar="C"
-    )
+        None, _channel, "name or index of the channel; default: the heights",
+        "a channel's name or index", "C",
+    )  # fmt: skip
     crop: tuple[float, ...] | None = parameter(
         None, crop_of, "size of the region to keep, µm, central or with the lower left corner X, "
-        "Y; default: all", metavar="W[,H[,X,Y]]",
+        "Y; default: all", "a width or a pair (width, height) in µm, above 0, perhaps with the "
+        "lower left corner, (width, height, x, y), or 'none'", "W[,H[,X,Y]]",
     )  # fmt: skip
     fill: str | None = parameter(
-        None, partial(_choice, name="fill", choices=("none", *preprocess.FILLS)),
-        "points without data: nearest or harmonic; default: refuse them", metavar="METHOD",
+        None, help="points without data: nearest or harmonic; none and auto: refuse them",
+        **_choices("none", *preprocess.FILLS),
     )  # fmt: skip
     level: str | None = parameter(
-        None, partial(_choice, name="level", choices=("none", *LEVELS)),
-        "surface to subtract: plane, quadratic (a scanner's arc), lines (aligned, then a plane) or "
-        "none; default: plane if a tilt shows", metavar="METHOD",
+        None, help="surface to subtract: plane, quadratic (a scanner's arc), lines (aligned, then "
+        "a plane) or none; default: plane if a tilt shows",
+        **_choices("none", *LEVELS, alone="one surface (HeightField.treated subtracts another), "),
     )  # fmt: skip
     clip: float | None = parameter(
-        None, _sigmas, "clip heights beyond N robust standard deviations (dust)", metavar="N"
-    )
+        None, _sigmas, "clip heights beyond N robust standard deviations (dust)",
+        "the number of standard deviations to keep, at least 1", "N",
+    )  # fmt: skip
     periodic: str | None = parameter(
-        None, _periodic, "edges: exact, whole periods of a surface that repeats; open, part of a "
-        "larger surface; default: open, of a file", metavar="METHOD",
+        None, help="edges: exact, whole periods of a surface that repeats; open, part of a larger "
+        "surface; default: open, of a file", **_choices(*PERIODICS),
     )  # fmt: skip
 
     @classmethod
@@ -132,7 +132,8 @@ class LoadOptions:
         Raises a DiffractionError if a value is not valid; the message names the parameter and the
         choices.
         """
-        return cls(**{name: OPTIONS[name].check(value) for name, value in options.items()})
+        stated = {n: value for n, value in options.items() if not retired_value(n, value)}
+        return cls(**{name: OPTIONS[name].checked(name, value) for name, value in stated.items()})
 
     def updated(self, other: LoadOptions) -> LoadOptions:
         """Return these options, replaced by those that `other` sets."""
@@ -222,7 +223,12 @@ def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
     if heights.base is None and heights is not raw.values:
         heights.setflags(write=False)  # nothing else refers to it: HeightField need not copy it
     history = (*notes, note) if note else notes
-    return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
+    stated = [] if options.pixel_size or not raw.sized else ["pixel_size"]
+    if options.height_unit is not None or (raw.stated and options.max_height is None):
+        stated.append("heights")
+    return HeightField(
+        heights, pixel_size, name=file.name, history=history, cut_out=True, stated=stated
+    )
 
 
 def fill_method(options: LoadOptions) -> str | None:
@@ -245,6 +251,15 @@ def _lengths(
     if pixel_size is None:
         raise _missing_lengths(shown, False, True)
     stated = raw.pixel_size
+    if not all(SHORTEST_PIXEL <= size <= LONGEST_PIXEL for size in pixel_size):
+        assumed = "" if raw.sized else " (x and y have no unit and are read as µm)"
+        metres = [1e6 * size for size in pixel_size]
+        hint = "{:g},{:g}".format(*metres) if min(metres) >= SHORTEST_PIXEL else ""
+        raise DiffractionError(
+            f"{shown} states pixels of {pixel_size[0]:.4g} x {pixel_size[1]:.4g} µm{assumed}, not "
+            f"{_PIXELS}; give pixel_size in µm, and height_unit"
+            + (f": of lengths in metres pixel_size={hint} height_unit=m" if hint else "")
+        )
     if stated is not None and not np.allclose(pixel_size, stated, rtol=_SAME_SIZE, atol=0):
         lines.append(
             f"pixel_size overrides the file's: pixels of {pixel_size[0]:.6g} x "

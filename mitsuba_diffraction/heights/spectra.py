@@ -41,6 +41,9 @@ _LEAST_FUNDAMENTAL = 0.02
 _SAME = 15.0
 # Background along a peak's direction: frequencies that are the peak's divided by these factors.
 _BESIDE = (1.25, 2.0)
+# A peak that has no other direction to stand out from has to stand out from its direction's
+# frequencies up to so many times its own: between harmonics, or from all if so few are between.
+_BEYOND, _FEW = 3.0, 4
 # Number of peaks that are examined, strongest first.
 _CANDIDATES = 12
 # Around a peak: bins of a Hann window's main lobe, and the spread of an irregular grating's
@@ -228,12 +231,17 @@ class _Spectrum:
         aside = np.hypot((fx - along * top[0]) * width, (fy - along * top[1]) * height)
         line = aside < _LOBE + 1
         repeats = self.repeats[iy, ix]
-        ring = (np.abs(self.repeats - repeats) < 1.5) & ~line & self.half
+        # of one frequency, not of one number of repeats: sides of a patch differ, noise does not
+        frequency = np.maximum(np.hypot(fx, fy), 1e-300)
+        ring = self.repeats * np.abs(1.0 - np.hypot(*top) / frequency) < 1.5
+        ring &= ~line & self.half
         beside = line & (along > 1 / _BESIDE[1]) & (along < 1 / _BESIDE[0])
         beside &= self.repeats < repeats - _LOBE - 0.5  # the lobe lies between two bins
         # a bin that a stronger peak explains is 0, and does not count as background
         seen = (part & (power > 0.0) for part in (ring, beside))
         background = [float(np.median(power[part])) for part in seen if part.any()]
+        if not ring.any():
+            background.append(self._beyond(np.where(aside < 0.5, along, 0.0), repeats))
         return _Peak(
             centre=centre,
             highest=(iy, ix),
@@ -244,6 +252,18 @@ class _Spectrum:
             repeats=float(np.hypot(*(centre * (width, height)))),
             contrast=float(power[iy, ix] / max(*background, 1e-30 * power[iy, ix], 1e-300)),
         )
+
+    def _beyond(self, along: Real, repeats: float) -> float:
+        """Return the mean power of other frequencies in a peak's direction, between its harmonics.
+
+        In a strip no other direction has the frequency of a peak whose period exceeds the width.
+
+        along : frequency over the peak's, 0 where the direction differs.
+        """
+        other = (along > 1 / _BESIDE[1]) & (along < _BEYOND) & (np.abs(along - 1) * repeats > _LOBE)
+        part = other & (np.abs(along - np.maximum(np.rint(along), 1)) * repeats > _LOBE - 0.25)
+        part = part if np.count_nonzero(part) >= _FEW else other
+        return float(self.power[part].mean()) if part.any() else math.inf
 
     def fundamental(self, peak: _Peak) -> _Peak | None:
         """Return the fundamental of a peak that is its second or third harmonic, or None."""

@@ -55,6 +55,8 @@ FACET, FACET_SLOPE = 0.01, 0.05
 #: lines jump. Isotropic surfaces stay within 1.5; ridges along x have correlated rows.
 JUMPS = 3.0
 
+#: Fewest rows and columns of which damage is told from structure.
+FEWEST_LINES = 8
 #: Second difference, over the RMS one of the scan, below which a line is straight.
 STRAIGHT = 1e-6
 #: Fewest lines that are reported: a flat groove may have two.
@@ -86,12 +88,13 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     slope = field.rms_slope
     if GENTLE_SLOPE < slope <= IMPOSSIBLE_SLOPE:
         slope = seen_slope(field, shortest)
+    question = units_warning(field)
     seen = " of the waves that light resolves" if slope < 0.95 * field.rms_slope else ""
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         lines.append(
-            f"{field.name}: {units_warning(field)}; no surface has an RMS slope of "
-            f"{field.rms_slope:.2g}"
+            f"{field.name}: {question}; no surface has an RMS slope of {field.rms_slope:.2g}"
         )
+        question = ""  # once
     elif slope > STEEP_SLOPE:
         lines.append(
             f"{field.name}: {UNRELIABLE}: RMS slope {slope:.2g}{seen} is above "
@@ -109,7 +112,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
         # k |(u, v)| reaches 2k at grazing angles on both sides, the pixels π/dx
         reach = shortest / (2 * coarse)
         lines.append(
-            f"{field.name}: {units_warning(field) or 'scan with finer pixels'}: pixels of "
+            f"{field.name}: {question or 'scan with finer pixels'}: pixels of "
             f"{coarse:.3g} µm are coarser than a quarter of the shortest wavelength, which is "
             f"{shortest / 4:.3g} µm, and do not resolve directions with |sinθi + sinθo| above "
             f"{reach:.2g} at {shortest * 1000:g} nm"
@@ -172,7 +175,7 @@ def tilted(field: HeightField, shortest: float) -> bool:
 
 def jumping_lines(field: HeightField) -> str:
     """Return advice where rows of a scan jump, as lines of an AFM do, or ""."""
-    if not field.cut_out or any("scan lines aligned" in line for line in field.history):
+    if not field.cut_out or min(field.shape) < FEWEST_LINES or _aligned(field):
         return ""
     steps = [np.diff(np.median(field.heights, axis=axis)).std() for axis in (1, 0)]
     pixels = field.pixel_size
@@ -190,21 +193,29 @@ def jumping_lines(field: HeightField) -> str:
 
 
 def units_warning(field: HeightField) -> str:
-    """Return a warning that lengths look like nanometres read as µm, or "" if plausible."""
-    coarse = max(field.pixel_size)
-    if coarse > COARSEST_PIXEL:
-        return f"is the pixel size of {coarse:.4g} µm {_IN_NM} it by 1000"
-    if field.rms_slope > IMPOSSIBLE_SLOPE:
-        return (
-            f"are the heights, with a range of {field.range:.4g} µm, {_IN_NM} them (of an image: "
-            "max_height) by 1000"
-        )
-    return ""
+    """Return a warning that lengths look like nanometres read as µm, or "" if plausible.
+
+    A unit that the file states is not doubted.
+    """
+    coarse, steep = max(field.pixel_size), field.rms_slope > IMPOSSIBLE_SLOPE
+    pixels, heights = f"the pixel size of {coarse:.4g} µm", f"with a range of {field.range:.4g} µm"
+    named = "(heights of a file: height_unit=nm; of an image: max_height)"
+    asked = "heights" not in field.stated
+    if steep and asked:
+        return f"are the heights, {heights}, {_IN_NM} them by 1000 {named}"
+    if steep:
+        return f"check pixel_size and height_unit: {pixels} contradicts heights {heights}"
+    if coarse <= COARSEST_PIXEL or "pixel_size" in field.stated:
+        return ""
+    if asked and 1000.0 * field.rms_slope > IMPOSSIBLE_SLOPE:  # on pixels a thousandth as wide
+        return f"are {pixels} and the heights, {heights}, {_IN_NM} both by 1000 {named}"
+    return f"is {pixels} {_IN_NM} it by 1000"
 
 
 def damage(field: HeightField) -> list[str]:
     """Return a line for each damage of a scan, with what to do; empty for other patches."""
-    if not field.cut_out or field.heights.size > LARGE or min(field.shape) < 8 or field.range == 0:
+    few = min(field.shape) < FEWEST_LINES
+    if not field.cut_out or field.heights.size > LARGE or few or field.range == 0:
         return []
     return [line for line in (_aborted(field), _repeated(field), _bow(field), _dust(field)) if line]
 
@@ -249,8 +260,11 @@ def _bow(field: HeightField) -> str:
     bow = level.heights - even.heights
     if bow.var() < BOW * level.heights.var() or np.ptp(bow) < LEAST_BOW:
         return ""
+    remedy = "level=quadratic"
+    if _aligned(field):  # by the option that this one would replace
+        remedy = "HeightField.treated(level='quadratic') in Python, beside level=lines"
     return (
-        f"{field.name}: use level=quadratic: the patch is bent by {np.ptp(bow):.3g} µm, as a "
+        f"{field.name}: use {remedy}: the patch is bent by {np.ptp(bow):.3g} µm, as a "
         "scanner's arc bends it, more than its relief"
     )
 
@@ -275,6 +289,11 @@ def _dust(field: HeightField) -> str:
         f"{np.abs(level - median).max():.3g} µm from the others, "
         f"and the RMS height is {rms:.3g} µm with them, {without:.3g} µm without"
     )
+
+
+def _aligned(field: HeightField) -> bool:
+    """Whether the lines of a scan were aligned."""
+    return any("scan lines aligned" in line for line in field.history)
 
 
 def _is_straight(lines: Real) -> np.ndarray:

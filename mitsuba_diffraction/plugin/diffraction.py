@@ -23,8 +23,8 @@ channel : string or integer [the heights]
 crop : float or string [none]
     Region to keep, µm: "width" or "width, height", central; or "width, height, x, y".
 fill : string [none]
-    Points without data: `none` refuses them, `nearest` copies the nearest height, `harmonic` spans
-    a membrane over the gap.
+    Points without data: `none`, `auto` refuse them, `nearest` copies the nearest height,
+    `harmonic` spans a membrane.
 level : string [auto]
     Surface to subtract: `plane`, `quadratic`, `lines` (aligned scan lines, then a plane) or `none`;
     `auto`: `plane` for files with a visible tilt.

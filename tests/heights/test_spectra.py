@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.heights import gratings
@@ -186,6 +186,25 @@ def test_waviness_beside_a_grating_has_no_period(seed):
 def test_rough_surfaces_have_none(seed):
     rough = rough_patch((160, 200), (0.1, 0.1), 0.2, correlation=0.4 * (1 + seed % 3), seed=seed)
     assert dominant_periods(rough) == []
+
+
+@pytest.mark.parametrize("shape", [(50, 500), (500, 50), (16, 1000)])
+def test_rough_strips_have_none(shape):
+    for seed in range(6):
+        white = np.random.default_rng(seed).standard_normal(shape)
+        rough = HeightField(gaussian_filter(white, 9.0, mode="wrap"), 0.08, cut_out=True)
+        assert examine_periods(rough) == ([], None), seed
+
+
+@pytest.mark.parametrize("direction", [0.0, 20.0])
+@pytest.mark.parametrize(("profile", "repeats"), [(np.cos, 3.3), (sawtooth, 5.3), (sawtooth, 12.0)])
+def test_a_grating_in_a_strip_is_found(profile, repeats, direction):
+    size = np.array([500, 50]) * PIXEL
+    turn = np.radians(direction)
+    period = float(np.hypot(*(size * (np.cos(turn), np.sin(turn))))) / repeats
+    found, *_ = dominant_periods(waves((50, 500), (period, direction, 0.1), profile=profile))
+    # few repeats along a sloping strip are known to a tenth of one
+    assert found.period == pytest.approx(period, rel=0.3 / repeats)
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (2, 400), (400, 2), (3, 5)])

@@ -84,7 +84,7 @@ def test_contradictions_and_unknown_units_are_refused(text, tmp_path):
     both = {"max_height": 1, "height_unit": "nm"}
     assert "without max_height" in refusal(text, **both)
     assert "grey levels" in refusal(tmp_path / "a.png", height_unit="nm", pixel_size=0.1)
-    assert "height_unit: expected a unit of length" in refusal(text, height_unit="V")
+    assert "must be a unit of length" in refusal(text, height_unit="V")
     np.save(tmp_path / "flat.npy", np.zeros((4, 4)))
     assert "is flat" in refusal(tmp_path / "flat.npy", max_height=1, pixel_size=0.1)
     assert LoadOptions.parse(height_unit="auto").height_unit is None
@@ -113,3 +113,32 @@ def test_notes_name_their_command_and_say_in_full_that_colours_are_not_reliable(
     assert line.startswith(steep[1])
     assert gentle[0] not in line
     assert "\n" not in line
+
+
+def questions(field):
+    return [line for line in field.validity() if "in nm?" in line]
+
+
+def test_a_unit_that_the_file_states_is_not_doubted(text, tmp_path):
+    path = tmp_path / "wide.txt"
+    header = "Width: 500 \u00b5m\nHeight: 300 \u00b5m"
+    np.savetxt(path, HEIGHTS, header=header, encoding="utf-8")
+    assert questions(HeightField.load(path)) == []
+    np.save(tmp_path / "wide.npy", HEIGHTS)
+    assert len(questions(HeightField.load(tmp_path / "wide.npy", pixel_size=100.0))) == 1
+
+
+def test_the_remedies_for_nanometres_leave_no_question(tmp_path):
+    np.save(tmp_path / "nm.npy", 1e2 * HEIGHTS)
+    (both,) = questions(HeightField.load(tmp_path / "nm.npy", pixel_size=50.0, level="none"))
+    assert "both by 1000" in both
+    remedied = {"pixel_size": 0.05, "height_unit": "nm", "level": "none"}
+    assert questions(HeightField.load(tmp_path / "nm.npy", **remedied)) == []
+    (heights,) = questions(HeightField.load(tmp_path / "nm.npy", pixel_size=0.5, level="none"))
+    assert "height_unit=nm" in heights
+    mended = HeightField.load(tmp_path / "nm.npy", pixel_size=0.5, height_unit="nm", level="none")
+    assert questions(mended) == []
+    wrong = HeightField.load(tmp_path / "nm.npy", pixel_size=0.001, height_unit="nm", level="none")
+    (line, *_) = wrong.validity()
+    assert questions(wrong) == []
+    assert "pixel_size" in line

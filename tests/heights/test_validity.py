@@ -134,6 +134,13 @@ def test_lines_that_jump_are_suggested_to_be_levelled():
         assert jumping_lines(still) == ""
 
 
+@pytest.mark.parametrize("shape", [(2, 2), (2, 9), (3, 2)])
+def test_few_lines_are_described_without_a_warning_of_numpy(shape):
+    patch = cut_out(0.01 * np.random.default_rng(1).normal(size=shape))
+    assert jumping_lines(patch) == ""
+    assert isinstance(patch.validity(), list)
+
+
 NORMAL = gaussian_filter(np.random.default_rng(1).normal(0.0, 0.03, (128, 128)), 3, mode="wrap")
 ROUGH = rough_patch((128, 128), (0.05, 0.05), 0.02).heights
 
@@ -173,6 +180,10 @@ def test_a_bow_is_named_and_removed():
     assert "level=quadratic" in line
     even = bent.treated(level="quadratic")
     assert damage(even) == []
+    # lines that are aligned keep the bow along them; the option would replace their alignment
+    (beside,) = damage(bent.treated(level="lines"))
+    assert "treated(level='quadratic')" in beside
+    assert damage(bent.treated(level="lines").treated(level="quadratic")) == []
     # a paraboloid takes 6 of the some hundred independent heights of the rough waves
     left = even.heights - even.heights.mean() - (ROUGH - ROUGH.mean())
     assert left.std() < 0.3 * ROUGH.std()

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ...errors import quoted
+
 __all__ = ["RawHeights", "catalogue", "first_line"]
 
 
@@ -27,6 +29,7 @@ class RawHeights:
     # without data are NaN
     values: npt.NDArray[np.floating]
     pixel_size: tuple[float, float] | None = None  # (dx, dy) in µm if the file says so
+    sized: bool = True  # the file states the unit of the pixel size; else µm are assumed
     relative: bool = False  # the values are fractions of a full scale that the file does not know
     notes: tuple[str, ...] = ()  # one line per choice that the reader made
     unit: float | None = 1.0  # µm in one unit of the values; None if the file says no length
@@ -35,5 +38,7 @@ class RawHeights:
 
 def first_line(error: BaseException) -> str:
     """Return the first line of an exception's text, to quote a library in a one-line message."""
+    if isinstance(error, KeyError):  # whose text is the key alone
+        return f"it has no {quoted(error.args[0] if error.args else '')}"
     lines = str(error).strip().splitlines()
     return lines[0][:200] if lines else type(error).__name__

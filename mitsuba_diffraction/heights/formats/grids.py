@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ...columns import read_columns
-from ...errors import DiffractionError, quoted
+from ...errors import DiffractionError, quoted, warn
 from ...limits import MOST_PIXELS
 from ..field import check_pixel_count
 from ..lengths import micrometres_of
+from ..preprocess import LARGEST_SHARE
 from . import RawHeights, first_line
-
-_BLOCK = 1 << 22  # values that are copied at a time
 
 # bytes of a text of so many points, x, y and height
 _LARGEST = 24 * 3 * MOST_PIXELS
@@ -30,8 +29,17 @@ _SIZE = re.compile(
     rf"[#;%\s]*+(?:({_WIDTH})|{_HEIGHT})\s*+[:=]\s*+([-+.,\deE]++)\s*+(\S++)\s*+$",
     re.IGNORECASE,
 )
-_VALUES = re.compile(
-    r"[#;%\s]*+(?:(?:Value|Height|Z) )?units?\s*+[:=]\s*+(\S++)\s*+$", re.IGNORECASE
+# "# Value units: nm", "# height in nm"
+_STATED = re.compile(
+    r"[#;%\s\"]*+(?:(?:(?:Value|Height|Z) )?units?\s*+[:=]\s*+|(?:all |the )?+(?:heights?|z)"
+    r"(?: values?)?+(?: are| is)?+ in )([^\s,;\".]++)[\s,;\".]*+$",
+    re.IGNORECASE,
+)
+# "Height [nm]", "# values in nm"; other words may be there: "# Height (retrace)"
+_NAMED = re.compile(
+    r"[#;%\s\"]*+(?:heights?|values?|z|topography|elevation)(?:[ _-][^\W\d_]{2,})*?"
+    r"(?:\s*+[\[(]\s*+([^\s\])]++)\s*+[\])]| in (\w++))[\s,;\".:]*+$",
+    re.IGNORECASE,
 )
 
 
@@ -58,7 +66,11 @@ def read_npy(path: Path) -> RawHeights:
                 f"{shown} has shape {values.shape}; expected two dimensions (ny, nx)"
             )
         check_pixel_count(values.shape[0], values.shape[1], shown)
-        return RawHeights(_copied(path, values))
+        # damaged files may hold signalling NaNs; `fill_missing` handles them
+        with np.errstate(invalid="ignore"):
+            heights = np.array(values, np.float64, order="C")
+        heights.setflags(write=False)  # so that a HeightField need not copy it
+        return RawHeights(heights)
     except DiffractionError:
         raise
     except (
@@ -70,27 +82,14 @@ def read_npy(path: Path) -> RawHeights:
         ) from error
 
 
-def _copied(path: Path, values: np.ndarray) -> np.ndarray:
-    """Copy the values to a read-only array; mapping each block anew releases the previous one."""
-    result = np.empty(values.shape, np.float64)
-    rows = max(1, _BLOCK // values.shape[1])
-    # damaged files may hold signalling NaNs; `fill_missing` handles them
-    with np.errstate(invalid="ignore"):
-        for start in range(0, len(result), rows):
-            mapped = np.load(path, mmap_mode="r", allow_pickle=False)
-            result[start : start + rows] = mapped[start : start + rows]
-    result.setflags(write=False)
-    return result
-
-
 def read_text(path: Path) -> RawHeights:
     """Read a grid of heights: one row a line, the first line the largest y, as in an image.
 
-    Heights are in µm unless a header line gives their unit, "Value units: nm" or "units: nm";
-    "Width: 10 µm" and "Height: 10 µm" give the size of the patch. Empty cells and "nan" are points
-    without data. Three columns are x, y and height, which have to form a regular grid; a line of
-    names above them may give their units, µm without, and another order. Separators and decimal
-    commas are as in `columns`.
+    Heights are in µm unless a header line gives their unit, "Value units: nm", "units: nm",
+    "Height [nm]" or "heights in nm"; "Width: 10 µm" and "Height: 10 µm" give the size of the patch.
+    Empty cells and "nan" are points without data. Three columns are x, y and height, which have to
+    form a regular grid, in which points may be missing; a line of names above them may give their
+    units, µm without, and another order. Separators and decimal commas are as in `columns`.
 
     Raises a DiffractionError if a cell is not a number, rows differ in length, or a unit is not a
     length.
@@ -107,7 +106,7 @@ def read_text(path: Path) -> RawHeights:
             "field needs a map (ny, nx)"
         )
     check_pixel_count(ny, nx, shown) if values.size > 3 * MOST_PIXELS else None
-    unit, stated, size = _read_header(table.header.values(), shown)
+    stated, size = _read_header(table.header.values(), shown)
     points = nx == 3 and ny > 3 and size is None  # a header with sizes belongs to a grid
     if not points:
         _refuse_names(table.header, shown)
@@ -115,37 +114,73 @@ def read_text(path: Path) -> RawHeights:
         raise DiffractionError(
             f"{shown} holds {nx} x {ny} numbers, a line scan; a height field needs a map (ny, nx)"
         )
-    pixel_size: tuple[float, float] | None
+    notes: tuple[str, ...] = ()
     if points:
         order = table.order("xy")
         x, y, height = (table.units[n] for n in order)
-        unit, stated = (_factor(height, shown), height) if height else (unit, stated)
-        units = [_factor(u, shown) if u else 1.0 for u in (x, y)]
-        values, pixel_size = _from_points(values[:, order] * [*units, 1.0], shown)
+        scales = [_factor(unit, shown) if unit else 1.0 for unit in (x, y)]
+        values, size = _from_points(values[:, order] * [*scales, 1.0], shown)
+        named, stated = bool(x and y), height or stated
     else:
-        pixel_size = (size[0] / nx, size[1] / ny) if size else None
-    return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
+        values, notes = _without_labels(values, shown)
+        named = size is not None
+    ny, nx = values.shape
+    pixel_size = (size[0] / nx, size[1] / ny) if size else None
+    unit = micrometres_of(stated) if stated else 1.0
+    return RawHeights(values[::-1], pixel_size, notes=notes, unit=unit, stated=stated, sized=named)
+
+
+def _without_labels(
+    values: npt.NDArray[np.float64], shown: str
+) -> tuple[npt.NDArray[np.float64], tuple[str, ...]]:
+    """Drop the labels 0, 1, 2, ... of columns and rows that pandas writes, and say so in a line.
+
+    Raises a DiffractionError if either alone is there, which heights might be.
+    """
+    row, column = (np.array_equal(v, np.arange(len(v))) for v in (values[0, 1:], values[1:, 0]))
+    if row and column and math.isnan(values[0, 0]):
+        line = "labels 0, 1, 2, ... of columns and rows, as pandas writes them, are left out"
+        warn(f"{shown}: {line}")
+        return values[1:, 1:], (line,)
+    whole = np.isfinite(values) & (values == np.rint(values))
+    for what, labels, others in (
+        ("line", values[0], whole[1:]), ("column", values[:, 0], whole[:, 1:]),
+    ):  # fmt: skip
+        counts = len(labels) > 3 and np.array_equal(labels, np.arange(len(labels)))
+        if counts and not others.all(axis=None):
+            raise DiffractionError(
+                f"{shown}: the first {what} of numbers is 0, 1, 2, ... {len(labels) - 1}, labels "
+                f"and no heights; leave it out (pandas: to_csv(..., header=False, index=False))"
+            )
+    return values, ()
 
 
 def _refuse_names(header: dict[int, str], shown: str) -> None:
     """Raise a DiffractionError for lines above a grid that are neither comment nor size."""
     for place, line in header.items():
-        if line.lstrip()[0] not in "#%" and not (_SIZE.match(line) or _VALUES.match(line)):
+        if line.lstrip()[0] not in "#%" and not (_SIZE.match(line) or _stated_unit(line)):
             raise DiffractionError(
                 f"{shown}, line {place}: {quoted(line)} is no row of numbers; expected a grid of "
                 "heights in µm (comments begin with '#')"
             )
 
 
-def _read_header(
-    header: Iterable[str], shown: str
-) -> tuple[float, str, tuple[float, float] | None]:
-    """Return µm per unit of the heights, the unit's name, and the patch's size, µm, if stated."""
-    unit, stated = 1.0, ""
+def _stated_unit(line: str) -> str:
+    """Return the unit of the heights that a line states, or ""."""
+    if match := _STATED.match(line):
+        return match[1]
+    match = _NAMED.match(line)
+    unit = (match[1] or match[2]) if match else ""
+    return unit if micrometres_of(unit) else ""
+
+
+def _read_header(header: Iterable[str], shown: str) -> tuple[str, tuple[float, float] | None]:
+    """Return the unit of the heights, "" without, and the patch's size, µm, if stated."""
+    stated = ""
     sizes: dict[str, float] = {}
     for line in header:
-        if match := _VALUES.match(line):
-            unit, stated = _factor(match[1], shown), match[1]
+        if unit := _stated_unit(line):
+            stated = unit
         elif match := _SIZE.match(line):
             try:
                 number = float(match[2].replace(",", "."))
@@ -153,11 +188,11 @@ def _read_header(
             except ValueError as error:
                 raise DiffractionError(f"{shown}: {line.strip()!r} is not a size") from error
     if len(sizes) < 2:
-        return unit, stated, None
+        return stated, None
     size = sizes["width"], sizes["height"]
     if not all(math.isfinite(s) and s > 0 for s in size):
         raise DiffractionError(f"{shown} states a size of {size[0]:g} x {size[1]:g} µm")
-    return unit, stated, size
+    return stated, size
 
 
 def _factor(unit: str, shown: str) -> float:
@@ -175,23 +210,26 @@ def _from_points(
 ) -> tuple[npt.NDArray[np.float64], tuple[float, float]]:
     """Arrange points (n, 3) of x, y, height into a grid, first row the largest y.
 
+    Points that are not listed are NaN, as points without a height.
+
     Returns
     -------
-    heights (ny, nx), pixel size (dx, dy) in µm
+    heights (ny, nx), size of the grid along x and y in µm
     """
     uneven = DiffractionError(
         f"{shown} has three columns, which are read as x, y and height (a line of names may give "
         "another order), but its points do not form a uniform grid; interpolate them to one first"
     )
+    points = points[~np.isnan(points).all(axis=1)]
     xs, ix = np.unique(points[:, 0], return_inverse=True)
     ys, iy = np.unique(points[:, 1], return_inverse=True)
-    every = np.unique(iy * xs.size + ix).size == xs.size * ys.size == len(points)
-    if not every or min(xs.size, ys.size) < 2 or not np.isfinite(points[:, :2]).all():
+    once = np.unique(iy * xs.size + ix).size == len(points) > LARGEST_SHARE * xs.size * ys.size
+    if not once or min(xs.size, ys.size) < 2 or not np.isfinite(points[:, :2]).all():
         raise uneven
     steps = np.diff(xs), np.diff(ys)
     # coordinates printed with few digits are rounded: up to 1 % of a step is uniform
     if any(np.ptp(step) > 0.01 * step.mean() for step in steps):
         raise uneven
-    grid = np.empty((ys.size, xs.size))
+    grid = np.full((ys.size, xs.size), np.nan)
     grid[iy, ix] = points[:, 2]
-    return grid[::-1], (float(steps[0].mean()), float(steps[1].mean()))
+    return grid[::-1], (float(steps[0].mean()) * xs.size, float(steps[1].mean()) * ys.size)

@@ -16,7 +16,6 @@ from ...extras import optional
 from ...files import beginning
 from ...limits import bounded_lines, bounded_memory, check_archive, check_content
 from ..field import check_pixel_count
-from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
 from .catalogue import way_out
 from .headers import stated_sizes
@@ -297,8 +296,6 @@ def _read_channel(reader: Any, channel: Any, shown: str, size: int) -> RawHeight
     if sized and lateral_scale is not None:
         width, length = (float(size) * lateral_scale for size in topography.physical_sizes)
         pixel_size = (width / nx, length / ny)
-        if not all(SHORTEST_PIXEL <= size <= LONGEST_PIXEL for size in pixel_size):
-            pixel_size = None  # some files state metres, or 0; the user has to say
     # heights()[ix, iy] with iy downwards from the top of the picture, as instruments show it
     return RawHeights(
         values.T[::-1], pixel_size, unit=_in_micrometres(height), stated=str(height or "")

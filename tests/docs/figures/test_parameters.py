@@ -72,8 +72,6 @@ def test_the_choices_are_those_of_the_code(some_variant, tmp_path, name):
     scan = {"filename": str(tmp_path / "scan.npy"), "pixel_size": 0.1, "coherence_width": 0.4}
     said = refusal(lambda: mi.load_dict({"type": "diffraction", **scan, name: "other"}))
     allowed = set(re.findall(r"\w+", said.partition("one of ")[2])) - {"got", "other"}
-    if name == "fill":
-        allowed -= {"auto"}  # which is none
     assert set(re.findall(r"`(\w+)`", BY_NAME[name].text)) == allowed
 
 

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
+from tests.support.refusals import refusal
 
 GRID = [[0.1, 0.2, 0.3, 0.4], [0.5, 0.6, 0.7, 0.8]]
 
@@ -120,7 +121,7 @@ def test_missing_cells_are_filled_if_asked(tmp_path):
         ("0 0 1\n1 0 1\n0 1 1\n1 1 1\n3 0 1\n3 1 1\n", "uniform grid"),
         ("nan nan nan\n" * 5, "uniform grid"),
         ("nan nan nan nan\n" * 5, "empty"),
-        ("# Value units: V\n1 2\n3 4\n", "unit of length"),
+        ("# Value units: V\n1 2\n3 4\n", "not a length"),
         ("# Width: 1 furlong\n1 2\n3 4\n", "furlong"),
         ("# Width: 0 nm\n# Height: 1 nm\n1 2\n3 4\n", "size"),
         ("nan nan\nnan nan\n", "no line|empty|line scan"),
@@ -160,8 +161,70 @@ def test_random_text_loads_or_is_one_clear_line(tmp_path, content, separator, fi
         assert "\n" not in str(error)
 
 
-@pytest.mark.parametrize("line", ["Value units: nm", "Value unit: nm", "units: nm", "z unit = nm"])
-def test_a_unit_that_a_comment_states_is_that_of_the_heights(tmp_path, line):
-    file = tmp_path / "mirror.txt"
-    file.write_text(f"# {line}\n0.5 0.25\n0.75 1\n", encoding="utf-8")
+@pytest.mark.parametrize(
+    "line",
+    ["# Value units: nm", "# Value unit: nm", "# units: nm", "# z unit = nm", "# height in nm",
+     "# All heights are in nm.", "# values in nm", "# Height [nm]", "Height [nm]", "Z sensor (nm)",
+     '"Height [nm]",,,'],
+)  # fmt: skip
+def test_a_unit_that_a_line_above_the_grid_states_is_that_of_the_heights(tmp_path, line):
+    file = tmp_path / "mirror.csv"
+    file.write_text(f"{line}\n0.5,0.25\n0.75,1\n", encoding="utf-8")
     assert HeightField.load(file, pixel_size=0.5, level="none").heights.max() == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("line", ["# Height (retrace)", "# heights of nm size", "# 9 rows in all"])
+def test_other_comments_state_no_unit(tmp_path, line):
+    (tmp_path / "a.txt").write_text(f"{line}\n0.5 0.25\n0.75 1\n", encoding="utf-8")
+    assert HeightField.load(tmp_path / "a.txt", pixel_size=0.5, level="none").heights.max() == 1.0
+
+
+def test_a_unit_that_is_no_length_is_overridden_by_height_unit(tmp_path):
+    (tmp_path / "a.txt").write_text("# heights in V\n1 2\n3 4\n", encoding="utf-8")
+    assert "'V', not a length" in refusal(tmp_path / "a.txt", pixel_size=0.5)
+    with pytest.warns(DiffractionWarning, match="not V"):
+        field = HeightField.load(tmp_path / "a.txt", pixel_size=5.0, height_unit="um")
+    assert field.range == 3.0
+
+
+POINTS = [(x * 0.5, y * 0.25, 10 * y + x) for y in range(3) for x in range(4)]
+
+
+def test_points_in_metres_say_what_to_give(tmp_path):
+    file = tmp_path / "a.txt"
+    np.savetxt(file, np.array(POINTS) * 1e-6)
+    line = refusal(file)
+    assert "5e-07 x 2.5e-07 µm" in line
+    words = dict(word.split("=") for word in line.split() if "=" in word)
+    with pytest.warns(DiffractionWarning):
+        field = HeightField.load(file, **words, level="none")
+    assert field.pixel_size == (0.5, 0.25)
+    assert field.range == pytest.approx(23.0)
+
+
+@pytest.mark.parametrize("gap", ["0.5,0.25,nan", "0.5,0.25,", "nan,nan,nan", None])
+def test_points_without_a_height_are_gaps(tmp_path, gap):
+    lines = [",".join(map(str, point)) for point in POINTS]
+    lines[5:6] = [] if gap is None else [gap]
+    (tmp_path / "a.csv").write_text("\n".join(lines), "utf-8")
+    assert "1 of 12 points" in refusal(tmp_path / "a.csv")
+    field = HeightField.load(tmp_path / "a.csv", fill="nearest", level="none")
+    assert field.pixel_size == (0.5, 0.25)
+    assert field.heights[2, 3] == 23.0
+
+
+def test_labels_of_rows_and_columns_are_no_heights(tmp_path):
+    heights = np.random.default_rng(1).random((5, 6)).round(3)
+    rows = [",".join(map(str, row)) for row in heights]
+    labelled = [",0,1,2,3,4,5", *(f"{n},{row}" for n, row in enumerate(rows))]
+    file = tmp_path / "a.csv"
+    file.write_text("\n".join(labelled), "utf-8")
+    with pytest.warns(DiffractionWarning, match="labels"):
+        field = HeightField.load(file, pixel_size=5.0, level="none")
+    assert np.array_equal(field.heights, heights[::-1])
+    for part in (["0,1,2,3,4,5", *rows], labelled[1:]):
+        file.write_text("\n".join(part), "utf-8")
+        assert "labels" in refusal(file, pixel_size=5.0)
+    ramp = np.add.outer(np.arange(5), np.arange(6))
+    np.savetxt(file, ramp, "%g", ",")
+    assert HeightField.load(file, pixel_size=5.0, level="none").range == 9.0

@@ -219,6 +219,13 @@ def test_heights_that_the_header_contradicts_are_refused(tmp_path, monkeypatch):
     assert "50 µm" in message
 
 
+def test_a_header_without_a_line_says_so(tmp_path):
+    wsxm(tmp_path / "a.top")
+    content = (tmp_path / "a.top").read_bytes()
+    (tmp_path / "a.top").write_bytes(content.replace(b"Number of rows", b"Number of lines"))
+    assert "it has no 'Number of rows'" in refusal(tmp_path / "a.top")
+
+
 def test_a_unit_of_one_axis_is_its_own(tmp_path):
     mdt(tmp_path / "a.mdt")
     content = (tmp_path / "a.mdt").read_bytes()

@@ -69,7 +69,7 @@ def test_channel_is_chosen_by_name_or_index(tmp_path):
     assert "is not one of 0 'Height', 1 'Deflection'" in refusal(path, channel="Phase")
     assert "is not one of" in refusal(path, channel=2)
     assert "is not one of" in refusal(path, channel=-1)
-    assert "channel:" in refusal(path, channel=1.5)
+    assert "channel=1.5" in refusal(path, channel=1.5)
 
 
 def test_channels_of_one_name_need_the_index(tmp_path):
@@ -92,6 +92,10 @@ def test_unknown_options_name_the_choices(tmp_path, option, value):
     message = refusal(write(tmp_path), **{option: value})
     assert message.startswith(option)
     assert repr(value) in message
+
+
+def test_two_levels_at_once_are_told_how_to_be_two_treatments(tmp_path):
+    assert "HeightField.treated" in refusal(write(tmp_path), level="lines,quadratic")
 
 
 def test_gwyddion_files_are_read(tmp_path):

@@ -84,7 +84,7 @@ def test_gaps_outside_the_middle_do_not_matter_and_tilt_is_that_of_the_middle(tm
 
 @pytest.mark.parametrize("bad", [0, -1, "wide", (1, 2, 3), float("nan"), True, ""])
 def test_no_size_is_named(bad):
-    with pytest.raises(DiffractionError, match="crop: expected a width or a pair"):
+    with pytest.raises(DiffractionError, match=r"crop=.* must be a width or a pair"):
         FIELD.treated(crop=bad)
 
 
@@ -168,7 +168,7 @@ def test_a_patch_in_memory_is_treated_as_a_file_is(tmp_path):
 def test_no_treatment_changes_nothing():
     field = HeightField(ROUGH, 0.1)
     assert np.array_equal(field.treated().heights, field.heights)
-    with pytest.raises(DiffractionError, match="level: expected one of 'auto', 'none', 'plane'"):
+    with pytest.raises(DiffractionError, match="one of 'auto', 'none', 'plane'"):
         field.treated(level="bow")
 
 
