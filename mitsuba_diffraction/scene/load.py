@@ -38,7 +38,9 @@ if TYPE_CHECKING:
     from .additions import SceneValues
     from .surfaces import Edit
 
-_SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
+_SOURCE_LINE = re.compile(
+    r'\[[\w./]+\.(?:cpp|h|py):\d+\]\s*(?:At dictionary node "root": )?'  # of a preset's own BSDF
+)
 _LOADING = re.compile(
     r"(?:While loading|Error while loading|At) (?P<file>.+?) \((?P<line>line \d+), col \d+\): "
 )

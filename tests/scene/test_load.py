@@ -39,6 +39,13 @@ CASES = {
     " line 8, in __init__\nmitsuba_diffraction.errors.DiffractionError: 'p.png' does not exist": (
         "'a.xml', line 8: bsdf 'y': 'p.png' does not exist"
     ),
+    '[parser.cpp:1718] At a.xml (line 8, col 25): failed to instantiate bsdf plugin of type "y": '
+    'Traceback (most recent call last):\n  File "/a/b.py", line 12, in <module>\nRuntimeError: '
+    '[parser.cpp:1718] At dictionary node "root": failed to instantiate bsdf plugin of type "z": '
+    'Traceback (most recent call last):\n  File "/a/b.py", line 9, in __init__\n'
+    "mitsuba_diffraction.errors.DiffractionError: unknown parameter 'k'": (
+        "'a.xml', line 8: bsdf 'y': bsdf 'z': unknown parameter 'k'"
+    ),
     "[parser.cpp:451] Error while loading a.xml (line 1, col 25): while processing <include>:\n"
     '[parser.cpp:451] Error while loading b.xml (line 3, col 5): could not parse integer value "c"':
     "'b.xml', line 3: while processing <include>: could not parse integer value \"c\"",

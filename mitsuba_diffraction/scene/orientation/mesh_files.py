@@ -15,18 +15,20 @@ from numpy.typing import NDArray
 
 from ...arrays import Whole
 from ...atomic import atomic_path
-from ...errors import DiffractionError, warn
+from ...errors import DiffractionError, one_line, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
 from ..meshes import mesh_arrays, with_relative_indices
 from .interchange import fans, interchange_mesh
-from .mesh_indices import FORMATS, any_line_begins, check_mesh, ply_header
+from .mesh_indices import FORMATS, check_mesh, ply_header, rests_of_lines
 from .trimesh import TriangleMesh, vertex_normals
 
 # What Mitsuba says before the mistake: places in its sources, its plugins, and the file
 _LOADING = re.compile(r'^.*(?:Error while loading \w+ file "[^"]*"|plugin of type "\w+"): ')
 # Errors of reading: Mitsuba's own, of text that is not UTF-8, of sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
+
+_NAMED = 4  # materials that a line lists
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
 
@@ -69,6 +71,7 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
         if mi.variant() is None:
             mi.set_variant("scalar_rgb")
         loaded = _load(file)
+        _warn_of_materials(file)
         if loaded.has_attribute(ORIENTATION):
             turns = np.array(loaded.attribute_buffer(ORIENTATION), dtype=np.float64)
             turns = turns.reshape(loaded.vertex_count(), -1)[:, :2]
@@ -99,7 +102,19 @@ def _states_normals(file: Path) -> bool:
         header = ply_header(file, f"mesh '{file}'")
         vertex = [e for e in header.elements if e.name == "vertex"] if header else []
         return any(words[-1] == "nx" for element in vertex for words in element.properties)
-    return file.suffix.lower() != ".obj" or any_line_begins(file, b"vn")
+    return file.suffix.lower() != ".obj" or next(rests_of_lines(file, b"vn"), None) is not None
+
+
+def _warn_of_materials(file: Path) -> None:
+    """Say that the materials of an OBJ file have no effect, if it has any."""
+    if file.suffix.lower() != ".obj":
+        return
+    if names := list(dict.fromkeys(rests_of_lines(file, b"usemtl"))):
+        listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
+        warn(
+            f"mesh '{file}': materials of OBJ files are not supported ({one_line(listed)}), the "
+            "mesh has one surface; export it as glTF (.glb) to give them surfaces by name"
+        )
 
 
 def _load(file: Path, **options: bool) -> mi.Mesh:
