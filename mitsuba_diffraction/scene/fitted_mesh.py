@@ -32,7 +32,7 @@ _FREE = 0.1
 _FEET = 0.02
 # A resting area that is twice as large overrules the convention of the file format.
 _CLEARLY = 2.0
-# Thickness of flat meshes and width of lines, as a part of their length; height of flat meshes above
+# Thickness of flat meshes and width of lines, as a part of their length; height of flat meshes over
 # the floor, with which they would else coincide, and degrees by which they lean back: upright ones
 # mirror the dark floor.
 _FLAT, _LINE, _ABOVE, _LEANS = 1e-4, 1e-6, 0.01, 40.0

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..plugin.memory import tensor
 from ..progress import Progress
-from .load import error_of
+from .mitsuba_errors import error_of
 
 #: Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 #: wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.

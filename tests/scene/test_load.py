@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
-from mitsuba_diffraction.scene.load import load_scene, plain_text
+from mitsuba_diffraction.scene.load import load_scene
+from mitsuba_diffraction.scene.mitsuba_errors import plain_text
 from tests.support.room import SKIN, scene_file, skin
 
 TWOSIDED = f'<bsdf type="twosided">{SKIN}</bsdf>'

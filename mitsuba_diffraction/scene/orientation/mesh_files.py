@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,13 +17,12 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import mesh_arrays, with_relative_indices
+from ..meshes import mesh_arrays
+from ..mitsuba_errors import reason_of
 from .interchange import fans, interchange_mesh
 from .mesh_indices import FORMATS, check_mesh, ply_header, rests_of_lines
 from .trimesh import TriangleMesh, vertex_normals
 
-# What Mitsuba says before the mistake: places in its sources, its plugins, and the file
-_LOADING = re.compile(r'^.*(?:Error while loading \w+ file "[^"]*"|plugin of type "\w+"): ')
 # Errors of reading: Mitsuba's own, of text that is not UTF-8, of sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
 
@@ -78,17 +76,11 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
         arrays = mesh_arrays(loaded)
         # Mitsuba's normals have seams where texture coordinates have
         arrays = arrays if _states_normals(file) else arrays._replace(normals=None)
-    faces, named = arrays.faces, np.zeros(len(arrays.positions), bool)
-    named[faces] = True
-    if not named.all():  # other vertices would count in the mesh's size
-        faces = (np.cumsum(named) - 1)[faces]
-    positions = arrays.positions[named]
-    own, uv, turns = (
-        None if rows is None else rows[named] for rows in (arrays.normals, arrays.uv, turns)
-    )
+    positions, own, uv, faces, materials = arrays
     normals = vertex_normals(positions, faces, uv) if own is None else own
     mesh = TriangleMesh(positions, normals, uv, faces, turns)
-    return MeshFile(file, mesh, own is not None, arrays.materials)
+    # other vertices would count in the mesh's size
+    return MeshFile(file, mesh.part(np.ones(len(faces), bool)), own is not None, materials)
 
 
 def load_mesh(path: str | os.PathLike[str]) -> TriangleMesh:
@@ -137,10 +129,8 @@ def _load(file: Path, **options: bool) -> mi.Mesh:
                 check_mesh(cut, kind, shown=shown)
                 with contextlib.suppress(*_UNREAD):
                     return mi.load_dict({"type": kind, "filename": str(cut)})
-        reason = _LOADING.sub("", " ".join(str(error).split())).rstrip("!. ")[-200:]
-        reason = with_relative_indices(reason)
         raise DiffractionError(
-            f"{shown}: cannot be read: {reason or type(error).__name__}; export it again"
+            f"{shown}: cannot be read: {reason_of(error)}; export it again"
         ) from error
 
 
