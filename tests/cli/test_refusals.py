@@ -340,7 +340,7 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     texts = {
         "room.xml": room.SCENE,
         "dull.xml": room.SCENE,
-        "line.obj": "v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nf 1/1 2/1 3/1\n",
+        "line.obj": "v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n",
         **{f"words.{suffix}": "words" for suffix in ("exr", "npy", "ply", "stl")},
         "empty.ply": "",
         "ply.ply": "ply",

@@ -120,14 +120,6 @@ def test_no_other_mesh_is(tmp_path, mesh, bsdf):
         load_scene(obj_scene(tmp_path, mesh, bsdf), {})
 
 
-@pytest.mark.usefixtures("variant")
-@pytest.mark.parametrize("bsdf", [FOLLOWING, f'<bsdf type="twosided">{FOLLOWING}</bsdf>'])
-def test_a_mesh_without_the_field_that_turns_the_patch_is_refused(tmp_path, bsdf):
-    """Kernels would go on with zeros, and not turn it."""
-    with pytest.raises(DiffractionError, match=r"hide has no attribute vertex_.*'tangents MESH"):
-        load_scene(obj_scene(tmp_path, UNWRAPPED, bsdf), {})
-
-
 @pytest.mark.parametrize("text", CASES)
 def test_errors_say_where_and_what(text):
     assert plain_text(RuntimeError(text)) == CASES[text]
