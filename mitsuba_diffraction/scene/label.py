@@ -228,7 +228,7 @@ def geometry(elevations: Real) -> tuple[float, Real]:
     if not low <= tangential[len(elevations) // 2] <= high:
         raise DiffractionError(
             f"the label's surface is inclined by {abs(middle):.0f}°, where no lamp shows its "
-            "colours to the camera; choose another height or turn"
+            "colours to the camera; choose another height, turn or up"
         )
     return ring, np.clip(tangential, low, high)
 
