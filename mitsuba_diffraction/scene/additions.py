@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
-from .mesh_materials import FITTED, OWN, PART, own_bsdf
+from .mesh_materials import FITTED, Part, own_bsdf
 from .orbit import ORBIT
 from .orientation.mesh_files import read_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
@@ -26,7 +26,7 @@ from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
 CLAMP = "render:clamp"
 
 # Properties of such a shape that say how its file is read
-_OF_FILE = ("filename", "fit", "up", "frame", "others", PART, OWN)
+_OF_FILE = ("filename", "fit", "up", "frame", "others")
 
 
 class SceneValues(NamedTuple):
@@ -62,11 +62,12 @@ def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValu
     return SceneValues(parameters, materials, surface, clamp, float(values.get(ORBIT, 0.0)))
 
 
-def fit_meshes(state: Any, folder: Path) -> None:
+def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
     """Replace shapes of type `fitted_mesh` by PLY files of the fitted meshes.
 
     state : `mi.parser.ParserState`.
     folder : where the files are written.
+    parts : materials of shapes that are parts of their files, see `split_meshes`.
 
     Raises a DiffractionError if a file is not a mesh, or cannot be put on the stage.
     """
@@ -84,14 +85,15 @@ def fit_meshes(state: Any, folder: Path) -> None:
             fitted[file, fit, up] = fitted_mesh(read, fit=fit, up=up), read.materials
         mesh, materials = fitted[file, fit, up]
         _frame(state, mesh.positions, props)
-        part = [int(each) for each in props.get(PART, "").split(",") if each]
+        part, own = parts.get(number, ([], False))
         ply = copied(props, "ply", leave=_OF_FILE)
         if part:
-            if not (chosen := np.isin(materials, part)).any():
+            chosen = np.isin(materials, [material.number for material in part])
+            if not chosen.any():
                 raise DiffractionError(f"mesh '{file}': its scene has no triangles of the material "
                                        f"'{props.id()}'; delete that material")  # fmt: skip
             mesh = mesh.part(chosen)
-        if OWN in props:
+        if own:
             ply["bsdf"] = own_bsdf(file, part[0])
         write_ply(written, mesh)
         ply["filename"] = str(written)

@@ -199,8 +199,8 @@ def _instantiated(
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)
-        of_meshes = split_meshes(state, values.materials)
-        fit_meshes(state, Path(folder))
+        of_meshes, parts = split_meshes(state, values.materials)
+        fit_meshes(state, Path(folder), parts)
         edits = put_materials(state, values.materials, of_meshes)
         edits += put_surface_parameters(state, values.surface)
         mi.parser.transform_all(config, state)
