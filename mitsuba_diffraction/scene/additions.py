@@ -6,6 +6,7 @@ A shape of type `fitted_mesh` becomes a mesh on the stage (`fitted_mesh.py`).
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arrays import Whole
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
@@ -71,7 +73,12 @@ def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
 
     Raises a DiffractionError if a file is not a mesh, or cannot be put on the stage.
     """
-    fitted: dict[tuple[Path, bool, str], tuple[TriangleMesh, Any]] = {}
+
+    @cache
+    def fitted(file: Path, fit: bool, up: str) -> tuple[TriangleMesh, Whole | None]:
+        read = read_mesh(file)
+        return fitted_mesh(read, fit=fit, up=up), read.materials
+
     for number, node in enumerate(state.nodes):
         if node.props.plugin_name() != FITTED:
             continue
@@ -79,11 +86,9 @@ def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
         if "filename" not in props:
             raise DiffractionError(f"shape '{FITTED}': the parameter filename is missing")
         file = Path(str(mi.file_resolver().resolve(props["filename"])))
-        fit, up, written = _boolean(props, "fit"), props.get("up", "auto"), folder / f"{number}.ply"
-        if (file, fit, up) not in fitted:
-            read = read_mesh(file)
-            fitted[file, fit, up] = fitted_mesh(read, fit=fit, up=up), read.materials
-        mesh, materials = fitted[file, fit, up]
+        fit, written = str(props.get("fit", "true")).lower(), folder / f"{number}.ply"
+        check_choice("fit", fit, ("true", "false"))
+        mesh, materials = fitted(file, fit == "true", props.get("up", "auto"))
         _frame(state, mesh.positions, props)
         part, own = parts.get(number, ([], False))
         ply = copied(props, "ply", leave=_OF_FILE)
@@ -119,14 +124,6 @@ def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
     pose[:3, 3] = framing(seen, pose[:3, :3], (tangents[0], tangents[1]))
     del props["to_world"]
     props["to_world"] = mi.ScalarTransform4f(pose)
-
-
-def _boolean(props: Any, name: str) -> bool:
-    """Read a parameter of a scene: true or false, as text."""
-    text = str(props.get(name, "true")).lower()
-    if text not in ("true", "false"):
-        raise DiffractionError(f"{name}={text!r} must be true or false")
-    return text == "true"
 
 
 def remove_dark_lights(state: Any) -> None:
