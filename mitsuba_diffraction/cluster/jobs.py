@@ -55,7 +55,7 @@ def build_on_workers(
     settings: TableSettings,
     client: Any,
     progress: Progress | None = None,
-) -> tuple[DiffractionTable, Jobs]:
+) -> tuple[DiffractionTable, WorkerCalls]:
     """Build as `build`, and return the table with the jobs that know their cost."""
     scans = [heights] if isinstance(heights, HeightField) else list(heights)
     if resolved(settings, scans).taper_width is None:
@@ -64,11 +64,11 @@ def build_on_workers(
             "without workers"
         )
     check_workers(client, None)
-    run = Jobs(client)
+    run = WorkerCalls(client)
     return build_with(heights, settings, progress, run), run
 
 
-class Jobs:
+class WorkerCalls:
     """Independent calls on workers, or here: as they finish, or in order.
 
     Parameters
