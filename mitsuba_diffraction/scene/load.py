@@ -18,7 +18,7 @@ from ..inputs import note_input
 from ..llvm import require_llvm
 from ..plugin import installed
 from ..system import memory
-from .bands import SensorBands, check_bands, put_bands, warn_of_dark_bands, wider_tables
+from .bands import SensorBands, check_bands, put_bands, wider_tables
 from .elements import check_attributes, name_of, surfaces_within
 from .meshes import has_texcoords
 from .mitsuba_errors import error_of
@@ -106,9 +106,7 @@ def load_scene(
     if values.orbit:
         turn_cameras(scene.sensors(), surfaces.values() or scene.shapes(), values.orbit)
     named = {name_of(shape, number): within[number] for number, shape in surfaces.items()}
-    if bands is not None:
-        check_bands(bands, named)
-    warn_of_dark_bands(scene.sensors(), named)
+    check_bands(scene.sensors(), named, eye=bands is not None)
     for edit in edits:
         if say is not None:
             say(edit.line(scene))
