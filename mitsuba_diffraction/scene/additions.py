@@ -14,7 +14,6 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Whole
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
@@ -75,7 +74,7 @@ def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
     """
 
     @cache
-    def fitted(file: Path, fit: bool, up: str) -> tuple[TriangleMesh, Whole | None]:
+    def fitted(file: Path, fit: bool, up: str) -> tuple[TriangleMesh, Any]:
         read = read_mesh(file)
         return fitted_mesh(read, fit=fit, up=up), read.materials
 
