@@ -23,7 +23,7 @@ import numpy as np
 from PIL import Image
 
 from ..atomic import atomic_path
-from ..cluster.jobs import run_jobs
+from ..cluster.jobs import WorkerCalls
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import readable_file
@@ -286,7 +286,7 @@ def run_survey(
     todo = list(jobs)
     files_of_jobs = [Path(named[n]["file"]).name for n in todo]
     progress(0, len(todo), _next(files_of_jobs, 0, client))
-    results = run_jobs(client, measure, [jobs[n] for n in todo])
+    results = WorkerCalls(client).finished(measure, [jobs[n] for n in todo])
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):

@@ -186,7 +186,7 @@ def _mesh(file: Path) -> dict[str, Any]:
     if file.suffix.lower() in GLTF:  # names that --preset and --assign take
         materials["materials"] = [each.name for each in materials_of(file)] or ["none"]
     try:
-        fit: Any = fit_of(mesh.positions, file).summary()
+        fit: Any = fit_of(mesh, file).summary()
     except DiffractionError as error:
         fit = f"none: {error}"
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)

@@ -153,7 +153,7 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
             _check_colours(args, output, scene, sensor)
             with Stop() as stop:
                 result = render_passes(
-                    scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop, progress=bar
+                    scene, sensor, spp=spp, seed=args.seed, stop=stop, progress=bar
                 )
         if result.spp == 0:
             raise KeyboardInterrupt  # interrupted before the first pass, without a picture
@@ -251,7 +251,7 @@ def _run_frames(args: argparse.Namespace) -> Figures:
                 with Bar(args, unit=" spp", delay=0) as bar:
                     bar(0, 0, "loading")
                     here = render_frames(
-                        args.scene, to_do, variant, with_exr=args.exr, progress=bar, say=say
+                        args.scene, to_do, with_exr=args.exr, progress=bar, say=say
                     )
                     done = sum(1 for _ in here)
     report = {"scene": args.scene, "frames": len(frames), "new": done,
@@ -285,7 +285,7 @@ def _frames_on_workers(
         film = film_of(args, client, wanted, variant, folder / "passes")
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for result, frame in zip(film.render(stop, bar), to_do, strict=False):
-                write_frame(frame, result.bitmap, args.scene, variant, args.exr)
+                write_frame(frame, result.bitmap, args.scene, args.exr)
                 done += 1
         return done, say_report(film)
 

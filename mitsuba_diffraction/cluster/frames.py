@@ -138,7 +138,7 @@ class FrameSequence:
         self.frames: list[Task] = []
         for number, frame in enumerate(frames):
             files = SceneFiles.from_scene(scene, frame.values)
-            passes = passes_of(self.sensor, frame.spp or default_samples, frame.seed, variant)
+            passes = passes_of(self.sensor, frame.spp or default_samples, frame.seed)
             self.frames.append(
                 Task(files, variant, sensor, preview, film, number, Span(0, len(passes)),
                      tuple(passes), kind, threads)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 import warnings
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from ..tables.build.build import build_with
 from .tasks import Failed, MissingFiles, check_versions, failures, versions
 from .workers import check_workers, outcome, wait_for_scheduler, workers_of
 
-_POLL = 0.02  # seconds
+_POLL = 0.005  # seconds
 #: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
 _AHEAD = 2
 
@@ -56,8 +55,8 @@ def build_on_workers(
     settings: TableSettings,
     client: Any,
     progress: Progress | None = None,
-) -> tuple[DiffractionTable, OrderedMap]:
-    """Build as `build`, and return the table with the map that knows its cost."""
+) -> tuple[DiffractionTable, WorkerCalls]:
+    """Build as `build`, and return the table with the jobs that know their cost."""
     scans = [heights] if isinstance(heights, HeightField) else list(heights)
     if resolved(settings, scans).taper_width is None:
         raise DiffractionError(
@@ -65,53 +64,16 @@ def build_on_workers(
             "without workers"
         )
     check_workers(client, None)
-    run = OrderedMap(client)
+    run = WorkerCalls(client)
     return build_with(heights, settings, progress, run), run
 
 
-def run_jobs(
-    client: Any, work: Callable[..., Any], jobs: Sequence[Any]
-) -> Iterator[tuple[int, Any]]:
-    """Do `work(job, contents)` for each job, and yield its number and result.
-
-    Raises a DiffractionError if the scheduler is gone, and does not come back.
+class WorkerCalls:
+    """Independent calls on workers, or here: as they finish, or in order.
 
     Parameters
     ----------
     client : `distributed.Client`, or None to do all here.
-    work : raises `MissingFiles` for files that it needs by content.
-    jobs : have `files`, `SceneFiles` that are known by content.
-
-    Returns
-    -------
-    Numbers and results; `Failed` where a worker died of a job, again and again.
-    """
-    if client is None:
-        for n, job in enumerate(jobs):
-            yield n, work(job)
-        return
-    waiting = {client.submit(work, job, pure=False): n for n, job in enumerate(jobs)}
-    try:
-        while waiting:
-            for future in [future for future in waiting if future.done()]:
-                n, result = waiting.pop(future), outcome(future)
-                if result is None:
-                    wait_for_scheduler(client)
-                    waiting[client.submit(work, jobs[n], pure=False)] = n
-                elif isinstance(result, MissingFiles):
-                    files, wanted = jobs[n].files.files, set(result.digests)
-                    contents = {d: Path(path).read_bytes() for path, d in files if d in wanted}
-                    waiting[client.submit(work, jobs[n], contents, pure=False)] = n
-                else:
-                    yield n, result
-            time.sleep(_POLL)
-    finally:
-        for future in waiting:
-            future.cancel()
-
-
-class OrderedMap:
-    """`map` on workers: results in the order of the arguments, a few of which are at work at once.
 
     Attributes
     ----------
@@ -129,47 +91,84 @@ class OrderedMap:
         return {name: getattr(self, name) for name in ("tasks", "retries", "busy")}
 
     def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
-        """Yield the results of `work` for each of the arguments.
+        """Yield results in the order of the arguments, a few of which are at work at once.
 
         Raises a DiffractionError that names the worker, if one fails; or if the scheduler is gone.
         """
-        waiting: deque[tuple[Any, Any]] = deque()
-        left = iter(arguments)
+        wanted, early = 0, dict[int, Any]()
+        for n, result in self.finished(work, arguments, early):
+            if isinstance(result, Failed):
+                raise DiffractionError(str(result))
+            early[n] = result
+            while wanted in early:
+                yield early.pop(wanted)
+                wanted += 1
+
+    def finished(
+        self, work: Callable[..., Any], arguments: Iterable[Any], early: Sized | None = None
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield the number and the result of each call as it finishes.
+
+        Raises a DiffractionError if the scheduler is gone, and does not come back.
+
+        Parameters
+        ----------
+        work : called with an argument; with the argument and contents of files, once it has raised
+            `MissingFiles`.
+        arguments : have `files`, `SceneFiles`, if the work needs files.
+        early : results that wait for others; None gives out all calls at once.
+
+        Returns
+        -------
+        Numbers and results; `Failed` for an error, or a worker that died of a call again and again.
+        """
+        left = enumerate(arguments)
+        if self._client is None:
+            yield from ((n, work(argument)) for n, argument in left)
+            return
+        waiting: dict[Any, tuple[int, Any]] = {}
         try:
             while True:
-                room = _AHEAD * max(1, len(workers_of(self._client))) - len(waiting)
-                for argument in itertools.islice(left, max(0, room)):
-                    waiting.append(((work, argument), self._submitted((work, argument))))
+                room = None
+                if early is not None:
+                    room = _AHEAD * max(1, len(workers_of(self._client)))
+                    room = max(0, room - len(waiting) - len(early))
+                for n, argument in itertools.islice(left, room):
+                    waiting[self._submitted(work, argument)] = n, argument
                 if not waiting:
                     return
-                yield self._result(waiting)
+                while not (done := [future for future in waiting if future.done()]):
+                    time.sleep(_POLL)
+                for future in done:
+                    (n, argument), answer = waiting.pop(future), outcome(future)
+                    if isinstance(answer, Failed):
+                        yield n, answer
+                    elif isinstance(answer, MissingFiles):
+                        files, wanted = argument.files.files, set(answer.digests)
+                        contents = {d: Path(path).read_bytes() for path, d in files if d in wanted}
+                        waiting[self._submitted(work, argument, contents)] = n, argument
+                    elif answer is None:
+                        wait_for_scheduler(self._client)
+                        self.retries += 1
+                        waiting[self._submitted(work, argument)] = n, argument
+                    else:
+                        result, seconds = answer
+                        self.tasks += 1
+                        self.busy += seconds
+                        yield n, result
         finally:
-            for _, future in waiting:
+            for future in waiting:
                 future.cancel()
 
-    def _result(self, waiting: deque[tuple[Any, Any]]) -> Any:
-        while (answer := outcome(waiting[0][1])) is None:
-            wait_for_scheduler(self._client)
-            self.retries += len(waiting)
-            for n, (call, _) in enumerate(waiting):
-                waiting[n] = call, self._submitted(call)
-        if isinstance(answer, Failed):
-            raise DiffractionError(str(answer))
-        waiting.popleft()
-        result, seconds = answer
-        self.tasks += 1
-        self.busy += seconds
-        return result
-
-    def _submitted(self, call: tuple[Any, Any]) -> Any:
+    def _submitted(self, *call: Any) -> Any:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Sending large graph")  # it is sent once
             return self._client.submit(_done, versions(), *call, pure=False)
 
 
-def _done(wanted: tuple[str, ...], work: Callable[[Any], Any], argument: Any) -> tuple[Any, float]:
+def _done(wanted: tuple[str, ...], work: Callable[..., Any], *given: Any) -> tuple[Any, float]:
     """Return the result of a call, and its seconds."""
     start = time.perf_counter()
     with failures():
         check_versions(wanted)  # a late worker has not been checked
-        return work(argument), time.perf_counter() - start
+        return work(*given), time.perf_counter() - start

@@ -105,6 +105,8 @@ def diffraction_preset(props: Properties) -> BSDF:
     Raises a DiffractionError if the preset is unknown, or a parameter does not fit its BSDF.
     """
     if PARAMETER not in props:
+        if near := difflib.get_close_matches(PARAMETER, props.keys(), 1):
+            raise DiffractionError(f"unknown parameter {near[0]!r}; did you mean {PARAMETER}?")
         raise DiffractionError(f"{PLUGIN}: the parameter {PARAMETER} is missing; e.g. cd")
     changes = {key: props[key] for key in props.keys() if key != PARAMETER}  # noqa: SIM118
     return mi.load_dict(preset(str(props[PARAMETER]), **changes) | {"id": props.id()})

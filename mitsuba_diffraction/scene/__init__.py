@@ -2,10 +2,11 @@
 
 Contents
 --------
-load         variants set and scenes loaded; Mitsuba's errors in one line
+load         variants set and scenes loaded
+mitsuba_errors  Mitsuba's errors in one line
 elements     names of elements, surfaces in their BSDFs, what a shape has to have
 nodes        checks of a parsed scene, before Mitsuba reads its files
-meshes       arrays of Mitsuba's meshes, of 3.9 and 3.10, and a message of their readers
+meshes       arrays of Mitsuba's meshes, of 3.9 and 3.10
 parameters   names that may be set, and values that change from frame to frame
 passes       rendering in passes of samples
 pictures     EXR and PNG of pictures

@@ -6,6 +6,7 @@ A shape of type `fitted_mesh` becomes a mesh on the stage (`fitted_mesh.py`).
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
-from .mesh_materials import FITTED, OWN, PART, own_bsdf
+from .mesh_materials import FITTED, Part, own_bsdf
 from .orbit import ORBIT
 from .orientation.mesh_files import read_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
@@ -26,7 +27,7 @@ from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
 CLAMP = "render:clamp"
 
 # Properties of such a shape that say how its file is read
-_OF_FILE = ("filename", "fit", "up", "frame", "others", PART, OWN)
+_OF_FILE = ("filename", "fit", "up", "frame", "others")
 
 
 class SceneValues(NamedTuple):
@@ -62,15 +63,21 @@ def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValu
     return SceneValues(parameters, materials, surface, clamp, float(values.get(ORBIT, 0.0)))
 
 
-def fit_meshes(state: Any, folder: Path) -> None:
+def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
     """Replace shapes of type `fitted_mesh` by PLY files of the fitted meshes.
 
     state : `mi.parser.ParserState`.
     folder : where the files are written.
+    parts : materials of shapes that are parts of their files, see `split_meshes`.
 
     Raises a DiffractionError if a file is not a mesh, or cannot be put on the stage.
     """
-    fitted: dict[tuple[Path, bool, str], tuple[TriangleMesh, Any]] = {}
+
+    @cache
+    def fitted(file: Path, fit: bool, up: str) -> tuple[TriangleMesh, Any]:
+        read = read_mesh(file)
+        return fitted_mesh(read, fit=fit, up=up), read.materials
+
     for number, node in enumerate(state.nodes):
         if node.props.plugin_name() != FITTED:
             continue
@@ -78,20 +85,19 @@ def fit_meshes(state: Any, folder: Path) -> None:
         if "filename" not in props:
             raise DiffractionError(f"shape '{FITTED}': the parameter filename is missing")
         file = Path(str(mi.file_resolver().resolve(props["filename"])))
-        fit, up, written = _boolean(props, "fit"), props.get("up", "auto"), folder / f"{number}.ply"
-        if (file, fit, up) not in fitted:
-            read = read_mesh(file)
-            fitted[file, fit, up] = fitted_mesh(read, fit=fit, up=up), read.materials
-        mesh, materials = fitted[file, fit, up]
+        fit, written = str(props.get("fit", "true")).lower(), folder / f"{number}.ply"
+        check_choice("fit", fit, ("true", "false"))
+        mesh, materials = fitted(file, fit == "true", props.get("up", "auto"))
         _frame(state, mesh.positions, props)
-        part = [int(each) for each in props.get(PART, "").split(",") if each]
+        part, own = parts.get(number, ([], False))
         ply = copied(props, "ply", leave=_OF_FILE)
         if part:
-            if not (chosen := np.isin(materials, part)).any():
+            chosen = np.isin(materials, [material.number for material in part])
+            if not chosen.any():
                 raise DiffractionError(f"mesh '{file}': its scene has no triangles of the material "
                                        f"'{props.id()}'; delete that material")  # fmt: skip
             mesh = mesh.part(chosen)
-        if OWN in props:
+        if own:
             ply["bsdf"] = own_bsdf(file, part[0])
         write_ply(written, mesh)
         ply["filename"] = str(written)
@@ -117,14 +123,6 @@ def _frame(state: Any, positions: NDArray[np.float64], shape: Any) -> None:
     pose[:3, 3] = framing(seen, pose[:3, :3], (tangents[0], tangents[1]))
     del props["to_world"]
     props["to_world"] = mi.ScalarTransform4f(pose)
-
-
-def _boolean(props: Any, name: str) -> bool:
-    """Read a parameter of a scene: true or false, as text."""
-    text = str(props.get(name, "true")).lower()
-    if text not in ("true", "false"):
-        raise DiffractionError(f"{name}={text!r} must be true or false")
-    return text == "true"
 
 
 def remove_dark_lights(state: Any) -> None:

@@ -93,23 +93,9 @@ def wider_tables(first: float) -> Iterator[None]:
         yield
 
 
-def check_bands(bands: SensorBands, surfaces: Mapping[str, Sequence[Surface]]) -> None:
-    """Refuse a table of heights, a file, that begins above the light that bands respond to.
-
-    surfaces : surfaces that diffract, by the names of their shapes.
-    """
-    first = min(bands.first, SHORTEST_WAVELENGTH)
-    for name, described in surfaces.items():
-        shortest = max((s.lit[0] for s in described if not s.solved), default=0.0)
-        if shortest > first:
-            raise DiffractionError(
-                f"{name}: the table begins at {shortest:g} nm, and the eye sees from {first:g} nm; "
-                f"give heights, or a table with wavelength_range=({first:g}, 830) (the command "
-                "'precompute')"
-            )
-
-
-def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[Surface]]) -> None:
+def check_bands(
+    sensors: Iterable[Any], surfaces: Mapping[str, Sequence[Surface]], eye: bool
+) -> None:
     """Warn of each surface whose table lacks wavelengths that a camera records.
 
     Light below a table's wavelengths is black; above a table of heights, light has the values of
@@ -118,6 +104,10 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[S
 
     sensors : cameras of the scene.
     surfaces : surfaces that diffract, by the names of their shapes.
+    eye : whether the cameras are an eye, for which tables of heights are made that it sees whole.
+
+    Raises a DiffractionError if a table of heights, a file, begins above the light that an eye
+    sees.
     """
     # spectral variants alone use a film's own responses
     banded = [
@@ -130,6 +120,8 @@ def warn_of_dark_bands(sensors: Iterable[Any], surfaces: Mapping[str, Sequence[S
     for name, described in surfaces.items():
         for solved, served in dict.fromkeys((s.solved, s.wavelengths) for s in described):
             if lacking := _lacking(solved, served, first, last):
+                if eye and not solved and first < served[0] - _MARGIN:
+                    raise DiffractionError(f"{name} {lacking}, or give heights")
                 warn(f"{name} {lacking}")
 
 

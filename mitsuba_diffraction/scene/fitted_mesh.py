@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +32,10 @@ _FREE = 0.1
 _FEET = 0.02
 # A resting area that is twice as large overrules the convention of the file format.
 _CLEARLY = 2.0
+# Thickness of flat meshes and width of lines, as a part of their length; height of flat meshes over
+# the floor, with which they would else coincide, and degrees by which they lean back: upright ones
+# mirror the dark floor.
+_FLAT, _LINE, _ABOVE, _LEANS = 1e-4, 1e-6, 0.01, 40.0
 
 
 class MeshPlacement(NamedTuple):
@@ -60,19 +65,21 @@ class MeshPlacement(NamedTuple):
         }
 
 
-def fit_of(positions: Real, file: Path, up: str = "auto") -> MeshPlacement:
+def fit_of(mesh: TriangleMesh, file: Path, up: str = "auto") -> MeshPlacement:
     """Compute how a mesh is put on the stage.
 
-    Raises a DiffractionError if `up` is not one of these, a vertex is not finite, or the mesh has
-    no volume.
+    Raises a DiffractionError if `up` is not one of these, a vertex is not finite, or all are on a
+    line.
 
     Parameters
     ----------
-    positions : (n, 3) vertices.
+    mesh : vertices and normals.
     file : file of the mesh, whose format suggests an axis and whose name is quoted in errors.
-    up : one of `UPS`; `auto` takes y or z, whichever the mesh stands on more firmly.
+    up : one of `UPS`; `auto` takes y or z, whichever the mesh stands on more firmly; a flat mesh
+        leans back and faces the camera.
     """
     check_choice("up", up, UPS)
+    positions = mesh.positions
     lost = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if len(lost):
         raise DiffractionError(
@@ -80,22 +87,28 @@ def fit_of(positions: Real, file: Path, up: str = "auto") -> MeshPlacement:
             f"({counted(len(lost), 'such vertex', 'such vertices')}); "
             "repair the mesh"
         )
-    sides = np.ptp(positions, axis=0)
-    if sides.min() <= 1e-6 * sides.max() or sides.max() == 0.0:
-        described = " x ".join(f"{side:.3g}" for side in sides)
+    centred = positions - positions.mean(axis=0)
+    squares, axes = np.linalg.eigh(centred.T @ centred)
+    if squares[1] <= _LINE**2 * squares[2]:
         raise DiffractionError(
-            f"mesh '{file}': its bounding box of {described} is flat, so it cannot stand on the "
-            "stage; give it a thickness, or use the rectangle of scenes/plate.xml"
+            f"mesh '{file}': all its vertices are on a line, so it has no surface; export it again"
         )
-    if up == "auto":
-        up = _guessed_up(positions, file)
+    flat, guessed = bool(squares[0] <= _FLAT**2 * squares[2]), up == "auto"
+    if guessed:
+        up = _guessed_up(positions, file, flat)
     rotation = _upright(up)
+    if guessed and flat:
+        front = axes[:, 0] * (-1.0 if axes[:, 0] @ mesh.normals.sum(axis=0) < 0.0 else 1.0)
+        rotation = _leaning(rotation @ front) @ rotation
     turned = positions @ rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     middle = (low + high) / 2
     radius = float(np.hypot(*(turned - middle)[:, :2].T).max())
-    scale = min(STAGE_RADIUS / radius, STAGE_HEIGHT / float(high[2] - low[2]))
+    scale = STAGE_RADIUS / radius
+    if (height := float(high[2] - low[2])) * scale > STAGE_HEIGHT:
+        scale = STAGE_HEIGHT / height
     shift = -scale * np.array([middle[0], middle[1], low[2]])
+    shift[2] += _ABOVE * flat
     return MeshPlacement(up, rotation, scale, shift, scale * (high - low))
 
 
@@ -107,7 +120,7 @@ def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> Triang
 
     Raises a DiffractionError if the mesh does not fit.
     """
-    mesh, placed = read.mesh, fit_of(read.mesh.positions, read.file, up)
+    mesh, placed = read.mesh, fit_of(read.mesh, read.file, up)
     if mesh.orientation is None and check_tangents(mesh).usable:
         mesh = replace(mesh, orientation=np.tile([1.0, 0.0], (len(mesh.positions), 1)))
     if fit:
@@ -158,7 +171,7 @@ def turned_around(positions: Real) -> Real:
 def _upright(up: str) -> Real:
     """Return the rotation (3, 3) that turns an axis of the file to z."""
     axis = {"x": 0, "y": 1, "z": 2}[up[-1]]
-    rotation = np.roll(np.eye(3), axis - 2, axis=0)
+    rotation = np.roll(np.eye(3), 2 - axis, axis=0)
     if up[-1] == "y":  # x stays, so that the front of a y-up mesh looks towards the camera
         rotation = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     if up[0] == "-":
@@ -166,7 +179,17 @@ def _upright(up: str) -> Real:
     return rotation
 
 
-def _guessed_up(positions: Real, file: Path) -> str:
+def _leaning(front: Real) -> Real:
+    """Return the rotation (3, 3) after which a unit normal looks to the camera and upwards."""
+    azimuth = math.atan2(-front[0], -front[1]) if np.hypot(*front[:2]) > _LINE else 0.0
+    lean = math.radians(_LEANS) - math.asin(np.clip(front[2], -1.0, 1.0))
+    cos, sin = math.cos(azimuth), math.sin(azimuth)
+    around_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    cos, sin = math.cos(lean), math.sin(lean)
+    return np.array([[1.0, 0.0, 0.0], [0.0, cos, sin], [0.0, -sin, cos]]) @ around_z
+
+
+def _guessed_up(positions: Real, file: Path, flat: bool) -> str:
     """Return y or z: the convention of the format, unless the mesh stands better on the other.
 
     Blender, scanners and CAD write PLY with z up; OBJ has y up in most programs. glTF and USD state
@@ -175,6 +198,8 @@ def _guessed_up(positions: Real, file: Path) -> str:
     if (stated := stated_up(file)) is not None:
         return stated
     usual, other = ("z", "y") if file.suffix.lower() == ".ply" else ("y", "z")
+    if flat:
+        return usual
     areas = {up: _resting_area(positions @ _upright(up).T) for up in (usual, other)}
     return other if areas[other] > _CLEARLY * areas[usual] else usual
 

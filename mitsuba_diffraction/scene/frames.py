@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import mitsuba as mi
+
 from ..atomic import atomic_path
 from ..errors import DiffractionError, counted, warn
 from ..extras import optional
@@ -90,7 +92,6 @@ def check_frames(scene: Path, frames: Sequence[Frame]) -> None:
 def render_frames(
     scene: Path,
     frames: Sequence[Frame],
-    variant: str,
     *,
     with_exr: bool,
     progress: Progress,
@@ -123,7 +124,7 @@ def render_frames(
                 progress(n * total + done, len(frames) * total, f"frame {n + 1} of {len(frames)}")
 
             result = render_passes(
-                loaded, sensor, spp=spp, seed=settings["seed"], variant=variant, stop=stop,
+                loaded, sensor, spp=spp, seed=settings["seed"], stop=stop,
                 progress=tell,
             )  # fmt: skip
             if result.interrupted and result.spp < spp:
@@ -131,13 +132,13 @@ def render_frames(
             picture = result.bitmap
             if settings["denoise"]:
                 picture = denoised(loaded, sensor, picture, result.spp, settings["seed"])
-            write_frame(frame, picture, scene, variant, with_exr)
+            write_frame(frame, picture, scene, with_exr)
             yield frame
             if stop.asked:
                 return
 
 
-def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: bool) -> None:
+def write_frame(frame: Frame, bitmap: Any, scene: Path, with_exr: bool) -> None:
     """Write a frame's files.
 
     Raises a DiffractionError if its film holds no colours.
@@ -153,7 +154,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
         warn(f"{frame.png}: {counted(bad, 'pixel')} not finite, and black")
     frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
     if with_exr:
-        write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": variant})
+        write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": str(mi.variant())})
     # the PNG marks the frame as done
     exposure, view = frame.settings["exposure"], frame.settings["view"]
     write_png(colours, frame.png, exposure, view, {_KEY: json.dumps(frame.settings)})

@@ -228,7 +228,7 @@ def geometry(elevations: Real) -> tuple[float, Real]:
     if not low <= tangential[len(elevations) // 2] <= high:
         raise DiffractionError(
             f"the label's surface is inclined by {abs(middle):.0f}°, where no lamp shows its "
-            "colours to the camera; choose another height or turn"
+            "colours to the camera; choose another height, turn or up"
         )
     return ring, np.clip(tangential, low, high)
 
@@ -283,25 +283,21 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
         "to_uv": " ".join(f"{x:.9g}" for x in (a, b, 0, c, d, e, 0, f, 0, 0, 1, 0, 0, 0, 0, 1)),
         "fov": f"{2 * math.degrees(math.atan(seen / _FAR)):.6g}" if mesh is None else "1",
         "half_width": f"{place.size[0] / 2:.6g}", "half_height": f"{place.size[1] / 2:.6g}",
-    }  # fmt: skip
-    lamp = {
         "ring_radius": f"{_DISTANCE * math.cos(math.radians(ring)):.6g}",
         "ring_low": f"{_MIDDLE + low:.6g}", "ring_high": f"{_MIDDLE + high:.6g}",
     }  # fmt: skip
     scene = folder / SCENE
-    _write_scene(scene, given | values, lamp, copy)
+    _write_scene(scene, given | values, copy)
     return scene
 
 
-def _write_scene(file: Path, values: Mapping[str, str], lamp: Mapping[str, str], mesh: str) -> None:
+def _write_scene(file: Path, values: Mapping[str, str], mesh: str) -> None:
     """Write the scene with these defaults, and a mesh of this name in the card's place, if any."""
     builder = ElementTree.TreeBuilder(insert_comments=True)
     parser = ElementTree.XMLParser(target=builder)
     root = ElementTree.parse(STUDIO.parent / "label.xml", parser).getroot()
     for default in root.iter("default"):
         default.set("value", values.get(default.get("name", ""), default.get("value", "")))
-    for number, (name, value) in enumerate(lamp.items()):
-        root.insert(number, ElementTree.Element("default", name=name, value=value))
     if mesh:
         shape = next(each for each in root.iter("shape") if each.get("id") == "label")
         shape.set("type", "fitted_mesh")

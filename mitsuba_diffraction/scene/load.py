@@ -1,36 +1,27 @@
-"""Variants set and scenes loaded; Mitsuba's errors in one line.
-
-Mitsuba 3.9 throws RuntimeError (ImportError for variants) with a text such as
-
-    [parser.cpp:1718] At a.xml (line 8, col 25): failed to instantiate bsdf plugin of type "x": ...
-
-in which nested causes are separated by line ends and an exception of a Python plugin is a whole
-traceback; warnings go to a logger of its own.
-"""
+"""Variants set, and scenes loaded, with Mitsuba's errors in one line."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
-import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
 
-from ..errors import DiffractionError, one_line, warn
+from ..errors import DiffractionError, warn
 from ..files import readable_file
-from ..heights.lengths import numbers_of
 from ..inputs import note_input
 from ..llvm import require_llvm
 from ..plugin import installed
 from ..system import memory
-from .bands import SensorBands, check_bands, put_bands, warn_of_dark_bands, wider_tables
+from .bands import SensorBands, check_bands, put_bands, wider_tables
 from .elements import check_attributes, name_of, surfaces_within
-from .meshes import has_texcoords, with_relative_indices
+from .meshes import has_texcoords
+from .mitsuba_errors import error_of
 from .orbit import turn_cameras
 from .parameters import check_parameters, files_of, parameters_of
 
@@ -38,24 +29,6 @@ if TYPE_CHECKING:
     from .additions import SceneValues
     from .surfaces import Edit
 
-_SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
-_LOADING = re.compile(
-    r"(?:While loading|Error while loading|At) (?P<file>.+?) \((?P<line>line \d+), col \d+\): "
-)
-_INSTANTIATE = re.compile(r'failed to instantiate (?P<kind>\w+) plugin of type "(?P<type>[^"]+)": ')
-_NOT_FOUND = re.compile(r'\[PluginManager\] Plugin "[^"]+" not found!')
-_TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: (?=\S))?")
-# Exceptions of a Python plugin that say nothing about the scene
-_NO_ERROR = re.compile(r"^(KeyboardInterrupt|MemoryError|SystemExit): ?(\d*)", re.M)
-_UNREAD = re.compile(
-    r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'
-)
-_NO_PLY = re.compile(
-    r'Error while loading PLY file "(?P<file>[^"]+)": (?:"[^"]+": )?'
-    r"(?P<why>(?:invalid PLY|incompatible contents|trailing tokens) .*)"
-)
-_UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
-_PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
 # mi.load_file's own arguments: a scene parameter of that name could not be passed.
 _TAKEN = ("path", "parallel", "optimize")
 # Least memory of a pixel: film, bitmap and one path of a wavefront.
@@ -133,9 +106,7 @@ def load_scene(
     if values.orbit:
         turn_cameras(scene.sensors(), surfaces.values() or scene.shapes(), values.orbit)
     named = {name_of(shape, number): within[number] for number, shape in surfaces.items()}
-    if bands is not None:
-        check_bands(bands, named)
-    warn_of_dark_bands(scene.sensors(), named)
+    check_bands(scene.sensors(), named, eye=bands is not None)
     for edit in edits:
         if say is not None:
             say(edit.line(scene))
@@ -177,10 +148,9 @@ def _check_parameters_act(
         return effective(parsed)
 
     for name, value in values.parameters.items() if values.materials else ():
-        default = defaults.get(name)
-        if default is None or _same(str(value), default):
+        if defaults.get(name) in (None, str(value)):
             continue
-        # a value may be the default in other words, such as the whole path of a file
+        # a value may be the default in other words: 0.0 for 0, the whole path of a file
         before, after = (read("", covered) != read(name, covered) for covered in (False, True))
         if before and not after:
             raise DiffractionError(
@@ -188,13 +158,6 @@ def _check_parameters_act(
                 f"surface on {', '.join(values.materials)} replaces; give that surface the "
                 f"parameter instead, e.g. cd,{name}={value}, or leave it out"
             )
-
-
-def _same(value: str, default: str) -> bool:
-    """Return whether two values of a parameter are equal, as texts or as numbers."""
-    return value == default or (
-        bool(numbers := numbers_of(value)) and numbers == numbers_of(default)
-    )
 
 
 def _instantiated(
@@ -234,8 +197,8 @@ def _instantiated(
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)
-        of_meshes = split_meshes(state, values.materials)
-        fit_meshes(state, Path(folder))
+        of_meshes, parts = split_meshes(state, values.materials)
+        fit_meshes(state, Path(folder), parts)
         edits = put_materials(state, values.materials, of_meshes)
         edits += put_surface_parameters(state, values.surface)
         mi.parser.transform_all(config, state)
@@ -339,76 +302,3 @@ def _check_films(state: Any) -> None:
                 f"this machine has {memory() / 1e9:.3g} GB; use fewer pixels (resx, resy of most "
                 "scenes)"
             )
-
-
-def plain_text(error: BaseException) -> str:
-    """Return the text of Mitsuba's exception as one line: where in the scene, and the mistake.
-
-    The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated "while
-    loading" are left out.
-    """
-    text = _TRACEBACK.sub("", _SOURCE_LINE.sub("", _words(error)))
-    places = [(m["file"], m["line"]) for m in _LOADING.finditer(text)]
-    text = _LOADING.sub("", text)
-    # "no plugin of this kind" is the cause, not a consequence of failing to make one
-    text = re.sub(
-        _INSTANTIATE.pattern + _NOT_FOUND.pattern,
-        lambda m: f"there is no {m['kind']} plugin {m['type']!r}; check the name",
-        text,
-    )
-    text = _UNREAD.sub(lambda m: f"{m[1]} {m[2]!r} has no such parameter:", text)
-    text = _NO_PLY.sub(_no_ply, text)
-    text = re.sub(r"\n\s*- ", " ", text)  # lists
-    text = _UNUSED.sub(_unused, text)
-    text = _INSTANTIATE.sub(lambda m: f"{m['kind']} {m['type']!r}: ", text)
-    text = one_line(_PLUGIN.sub("", with_relative_indices(text))).rstrip(" .!")
-    if places:
-        file, line = places[-1]
-        text = f"'{file}', {line}: {text}"
-    return text
-
-
-def error_of(failed: str, error: BaseException) -> BaseException:
-    """Return the error to raise for Mitsuba's exception.
-
-    Mitsuba makes a RuntimeError of whatever a Python plugin raises: Ctrl-C, an exit and lack of
-    memory are themselves again, anything else is a DiffractionError that begins with `failed`.
-    """
-    original = _NO_ERROR.search(_words(error))
-    if original is None:
-        return DiffractionError(f"{failed}: {plain_text(error)}")
-    if original[1] == "SystemExit":
-        return SystemExit(int(original[2] or 1))
-    return KeyboardInterrupt() if original[1] == "KeyboardInterrupt" else MemoryError()
-
-
-def _words(error: BaseException) -> str:
-    """Return the text of an exception; damaged scenes are quoted as bytes that are not UTF-8."""
-    if isinstance(error, UnicodeDecodeError):
-        return error.object.decode("utf-8", "replace")
-    return str(error)
-
-
-def _no_ply(match: re.Match[str]) -> str:
-    """Return the remedy for a mesh of another format where a PLY is expected."""
-    file = PurePath(match["file"])
-    todo = f"run the command 'tangents {file} -o mesh.ply' first, and use mesh.ply"
-    if not match["why"].startswith("invalid PLY"):
-        return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
-    if file.suffix.lower() in (".ply", ""):
-        return f"'{file}' is a damaged PLY: {match['why']}; export the mesh again"
-    if file.suffix.lower() not in (".obj", ".serialized"):
-        todo = "convert it to PLY or OBJ"
-    return f"'{file}' is not a PLY mesh, which the scene expects: {todo}"
-
-
-def _unused(match: re.Match[str]) -> str:
-    """Name parameters that are given and that nothing in the scene reads."""
-    names = re.findall(r"\$(\w+)=", match["list"])
-    if not names:
-        return match[0]
-    return (
-        f"no object of the scene uses {', '.join('$' + name for name in names)}, although it "
-        f"declares it: write ${names[0]} where its value is to go, or leave "
-        f"{', '.join(names)} out"
-    )

@@ -18,12 +18,11 @@ from .surfaces import appended, copied, inner
 FITTED = "fitted_mesh"
 #: Values of `others`: materials that no surface is put on have the shape's surface, or their own.
 OTHERS = ("surface", "own")
-#: Properties of a shape: numbers of the materials of its file that it has, a text with commas; and
-#: whether it has the file's own material.
-PART, OWN = "materials", "own"
+#: Materials of a shape's file that it has, and whether it has their own BSDF.
+Part = tuple[list[GltfMaterial], bool]
 
 
-def split_meshes(state: Any, wanted: Collection[str]) -> list[str]:
+def split_meshes(state: Any, wanted: Collection[str]) -> tuple[list[str], dict[int, Part]]:
     """Make shapes of the materials of glTF files that surfaces are put on.
 
     Ids of the scene go before names of materials.
@@ -31,9 +30,11 @@ def split_meshes(state: Any, wanted: Collection[str]) -> list[str]:
     state : `mi.parser.ParserState`.
     wanted : ids that surfaces are put on.
 
-    Returns the names of all materials of these files.
+    Returns the names of all materials of these files, and the materials of each shape that is a
+    part of its file, by the number of its node.
     """
     known: list[str] = []
+    split: dict[int, Part] = {}
     for number in range(len(state.nodes)):
         props = state.nodes[number].props
         if props.plugin_name() != FITTED or "filename" not in props:
@@ -53,47 +54,29 @@ def split_meshes(state: Any, wanted: Collection[str]) -> list[str]:
         if others == OTHERS[0]:
             parts = {name: parts[name] for name in parts if name in ids}
             parts |= {props.id(): rest} if rest else {}
-        made = [
-            _part(state, number, name, part, others == OTHERS[1] and name not in ids)
-            for name, part in parts.items()
-        ]
-        _put_shapes(state, number, made)
-    return known
+        surfaces = inner(state, state.nodes[number], mi.ObjectType.BSDF)
+        own = {name: others == OTHERS[1] and name not in ids for name in parts}
+        made = [copied(props, FITTED, leave=[*surfaces] if own[name] else ()) for name in parts]
+        numbers = {name: n for name, n in state.id_to_index.items() if n != number}
+        for n, (name, shape) in enumerate(zip(parts, made, strict=True)):
+            shape.set_id(name)
+            if n == 0:  # in place of the whole
+                state.nodes[number].props, at = shape, number
+            else:
+                added = appended(state, mi.ObjectType.Shape, shape)
+                at = added.index()
+                state.nodes[0].props[f"part_{at}"] = added
+            numbers[name], split[at] = at, (parts[name], own[name])
+        state.id_to_index = numbers
+    return known, split
 
 
-def _part(state: Any, number: int, name: str, part: list[GltfMaterial], own: bool) -> Any:
-    """Return the properties of a shape of some materials of another shape's file.
-
-    own : whether it has the file's material in place of the surface of the whole.
-    """
-    whole = state.nodes[number]
-    surfaces = inner(state, whole, mi.ObjectType.BSDF) if own else ()
-    copy = copied(whole.props, whole.props.plugin_name(), leave=[*surfaces])
-    if own:
-        copy[OWN] = True
-    copy[PART] = ",".join(str(material.number) for material in part)
-    copy.set_id(name)
-    return copy
-
-
-def _put_shapes(state: Any, number: int, made: list[Any]) -> None:
-    """Put several shapes in place of one."""
-    ids = {name: n for name, n in state.id_to_index.items() if n != number}
-    state.nodes[number].props, ids[made[0].id()] = made[0], number
-    for props in made[1:]:
-        added = appended(state, mi.ObjectType.Shape, props)
-        ids[props.id()] = added.index()
-        state.nodes[0].props[f"part_{added.index()}"] = added
-    state.id_to_index = ids
-
-
-def own_bsdf(file: Path, number: int) -> Any:
+def own_bsdf(file: Path, material: GltfMaterial) -> Any:
     """Return the BSDF of a material of a glTF file: base colour, metallic and roughness.
 
     The textures of metallic and roughness (glTF 2.0, 3.9.2), and all else, are left out with a
     warning.
     """
-    material = next(each for each in materials_of(file) if each.number == number)
     if material.left_out:
         warn(
             f"material {material.name!r} of '{file}' is shown without its "

@@ -1,4 +1,4 @@
-"""Arrays of Mitsuba's meshes, and a message of their readers.
+"""Arrays of Mitsuba's meshes.
 
 The names and shapes of the arrays differ between Mitsuba 3.9 and 3.10. Up to 3.9 a mesh has flat
 buffers with an entry for each vertex. From 3.10 on it has tensors, and vertices may share positions
@@ -7,15 +7,11 @@ and normals, which they then name by index.
 
 from __future__ import annotations
 
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..arrays import Real, Whole
-
-# An index of an OBJ file below 0, to which Mitsuba adds 2^32
-_RELATIVE = re.compile(r"reference to invalid (vertex|normal|texture coordinate) ([2-4]\d{9})\b")
 
 
 class MeshArrays(NamedTuple):
@@ -52,17 +48,6 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
     positions = _of_vertices(values, 3, mesh, "position_index")
     faces = np.array(_call(mesh, "faces_buffer", "faces"), np.int64).reshape(-1, 3)
     return MeshArrays(positions, normals, uv, faces)
-
-
-def with_relative_indices(text: str) -> str:
-    """Show the indices below 0 of an OBJ file in a message of Mitsuba's as the file has them."""
-    return _RELATIVE.sub(
-        lambda match: (
-            f"it names {match[1]} {int(match[2]) - (1 << 32)}, counted back from the "
-            "last, which Mitsuba does not read"
-        ),
-        text,
-    )
 
 
 def has_texcoords(mesh: Any) -> bool:

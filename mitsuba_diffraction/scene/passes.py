@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..plugin.memory import tensor
 from ..progress import Progress
-from .load import error_of
+from .mitsuba_errors import error_of
 
 #: Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 #: wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
@@ -68,12 +68,12 @@ class Stop:
         self.asked = True
 
 
-def samples_per_pass(spp: int, pixels: int, variant: str) -> int:
+def samples_per_pass(spp: int, pixels: int) -> int:
     """Return how many of `spp` samples per pixel to take at once.
 
     Passes of one size share one kernel, so a divisor of `spp` is taken if one is large enough.
     """
-    most = max(1, SAMPLES.get(variant.split("_")[0], 0) // pixels)
+    most = max(1, SAMPLES.get(str(mi.variant()).split("_")[0], 0) // pixels)
     if spp <= most:
         return spp
     for size in range(most, max(1, most // 2) - 1, -1):
@@ -90,13 +90,13 @@ class Pass:
     spp: int
 
 
-def passes_of(sensor: Any, spp: int, seed: int, variant: str) -> list[Pass]:
+def passes_of(sensor: Any, spp: int, seed: int) -> list[Pass]:
     """List the passes that take `spp` samples per pixel, or a few more for stratified samplers.
 
     Parameters as in `render_passes`.
     """
     sampler, seeds = sensor.sampler(), np.random.SeedSequence(seed)
-    size = samples_per_pass(spp, int(np.prod(sensor.film().crop_size())), variant)
+    size = samples_per_pass(spp, int(np.prod(sensor.film().crop_size())))
     result, done = [], 0
     while done < spp:
         sampler.set_sample_count(min(size, spp - done))
@@ -188,7 +188,7 @@ def _splats(integrator: Any) -> bool:
 
 
 def render_passes(
-    scene: Any, sensor: Any, *, spp: int, seed: int, variant: str, stop: Stop, progress: Progress
+    scene: Any, sensor: Any, *, spp: int, seed: int, stop: Stop, progress: Progress
 ) -> Result:
     """Render `spp` samples per pixel as the average over passes, exactly as one pass would.
 
@@ -199,7 +199,6 @@ def render_passes(
     scene, sensor : of the variant that is set.
     spp : samples per pixel; stratified samplers round it up, and the result says to what.
     seed : whole number from 0; each pass gets its own, derived from it.
-    variant : name of the variant.
     stop : asked, it ends the rendering after the current pass.
     progress : called as progress(samples done, samples in all, activity).
 
@@ -208,7 +207,7 @@ def render_passes(
     integrator_of(scene)
     progress(0, spp, "compiling")
     done = 0
-    passes = passes_of(sensor, spp, seed, variant)
+    passes = passes_of(sensor, spp, seed)
 
     def sum_of(span: Span) -> Any:
         nonlocal done
@@ -218,7 +217,7 @@ def render_passes(
             return None
         each = passes[span.first]
         raw = render_pass(scene, sensor, each)
-        if stop.asked and variant.startswith("scalar"):
+        if stop.asked and str(mi.variant()).startswith("scalar"):
             return 0.0  # Mitsuba left this pass unfinished; a JIT variant never does
         done += each.spp
         progress(min(done, spp), spp, "rendering")

@@ -10,9 +10,10 @@ import mitsuba as mi
 import numpy as np
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError
 from ..files import readable_file
 from ..optics.display import natural
+from .mitsuba_errors import reason_of
 
 # Pixel formats that a screen can show, and what becomes of them in a PNG.
 _SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y", "YA": "YA"}
@@ -29,8 +30,7 @@ def read_exr(path: Path) -> Any:
     try:
         colours = colours_of(mi.Bitmap(str(path)))
     except RuntimeError as error:
-        reason = one_line(str(error)).rpartition("] ")[2]
-        raise DiffractionError(f"cannot read '{path}' as a picture: {reason}") from error
+        raise DiffractionError(f"cannot read '{path}' as a picture: {reason_of(error)}") from error
     if colours is None:
         raise DiffractionError(
             f"'{path}' holds no colours that a screen could show; name a picture with the channels "
@@ -49,9 +49,9 @@ def check_panorama(path: Path) -> Path:
     try:
         picture = mi.Bitmap(str(path))
     except RuntimeError as error:
-        reason = one_line(str(error)).rpartition("] ")[2].rpartition(": ")[2].rstrip("!")
         raise DiffractionError(
-            f"'{path}' is not a panorama that Mitsuba reads ({reason}); name an HDR or EXR"
+            f"'{path}' is not a panorama that Mitsuba reads ({reason_of(error)}); name an HDR or "
+            "EXR"
         ) from error
     width, height = picture.width(), picture.height()
     if not 1.9 <= width / height <= 2.1:

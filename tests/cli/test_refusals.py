@@ -169,7 +169,7 @@ REFUSED = {
     "hologram": {
         "red.png": "no colour beside its ground",
         "none.png": "'none.png' does not exist",
-        "logo.png --mesh flat.obj": "flat",
+        "logo.png --mesh line.obj": "on a line",
         "logo.png --mesh bare.obj": "no texture coordinates",
     },
     "export-osl": {
@@ -340,7 +340,7 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     texts = {
         "room.xml": room.SCENE,
         "dull.xml": room.SCENE,
-        "flat.obj": "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nf 1/1 2/1 3/1\n",
+        "line.obj": "v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n",
         **{f"words.{suffix}": "words" for suffix in ("exr", "npy", "ply", "stl")},
         "empty.ply": "",
         "ply.ply": "ply",

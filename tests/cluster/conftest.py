@@ -71,7 +71,7 @@ def expected(scene):
     dr.set_thread_count(1)
     loaded = load_scene(scene, {})
     result = passes.render_passes(
-        loaded, loaded.sensors()[0], spp=SPP, seed=3, variant=VARIANT, stop=passes.Stop(),
+        loaded, loaded.sensors()[0], spp=SPP, seed=3, stop=passes.Stop(),
         progress=silent,
     )  # fmt: skip
     dr.set_thread_count(before)

@@ -14,7 +14,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster
 from mitsuba_diffraction.cluster import jobs as jobs_module
 from mitsuba_diffraction.cluster import tasks
-from mitsuba_diffraction.cluster.jobs import OrderedMap
+from mitsuba_diffraction.cluster.jobs import WorkerCalls
 from tests.support.scans import PIXEL, SETTINGS, rough
 from tests.support.systems import posix
 
@@ -55,25 +55,28 @@ class _Future:
         self.client.under_way -= 1
         return self.work(*self.arguments)
 
+    def done(self):
+        return True
+
     def cancel(self):
         pass
 
 
 def test_few_tasks_are_under_way_however_many_there_are():
     client = _Workers(3)
-    assert list(OrderedMap(client)(abs, range(-50, 0))) == list(range(50, 0, -1))
+    assert list(WorkerCalls(client)(abs, range(-50, 0))) == list(range(50, 0, -1))
     assert client.most == 6
 
 
 def test_an_error_on_a_worker_is_one_line_with_its_name():
     with pytest.raises(DiffractionError, match=r"^worker this process: unexpected TypeError: bad"):
-        list(OrderedMap(_Workers(1))(abs, ["no number"]))
+        list(WorkerCalls(_Workers(1))(abs, ["no number"]))
 
 
 def test_a_late_worker_with_another_version_is_named(monkeypatch):
     monkeypatch.setattr(jobs_module, "versions", lambda: ("0.1", "0.1", "0.1"))
     with pytest.raises(DiffractionError, match=r"^worker this process: it has .* the client 0\.1"):
-        list(OrderedMap(_Workers(1))(abs, [1]))
+        list(WorkerCalls(_Workers(1))(abs, [1]))
 
 
 def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):

@@ -63,6 +63,8 @@ def test_the_plugin_names_what_is_wrong():
         mi.load_dict({"type": "diffraction_preset", "preset": "dvdd"})
     with pytest.raises(RuntimeError, match="preset is missing"):
         mi.load_dict({"type": "diffraction_preset"})
+    with pytest.raises(RuntimeError, match="'presets'; did you mean preset"):
+        mi.load_dict({"type": "diffraction_preset", "presets": "dvd"})
 
 
 @pytest.mark.thorough

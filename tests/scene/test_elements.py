@@ -6,7 +6,7 @@ import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction import DiffractionError, bsdf_dict
-from mitsuba_diffraction.scene.elements import check_attributes, name_of, own_id
+from mitsuba_diffraction.scene.elements import check_attributes, name_of
 from tests.support.directions import rough_patch
 from tests.support.gentle import load
 
@@ -20,7 +20,8 @@ def plate(name: str):
     """A triangle whose pigment is this attribute."""
     props = mi.Properties()
     texture = {"type": "mesh_attribute", "name": name}
-    props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": texture})
+    pigment = {"type": "diffuse", "reflectance": texture}
+    props["bsdf"] = mi.load_dict({"type": "twosided", "bsdf": pigment})
     mesh = mi.Mesh("plate", 3, 1, props=props)
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 1, 1, 0]
@@ -93,7 +94,3 @@ MESH = 'PLYMesh[\n  name = "meshes/knot.ply",\n  bbox = ...'
 )
 def test_without_an_id_it_is_the_file_or_the_kind_and_place(element, number, name):
     assert name_of(element, number) == name
-
-
-def test_ids_that_mitsuba_makes_up_are_none():
-    assert [own_id(given) for given in ("foil", "_unnamed_12", "")] == ["foil", "", ""]

@@ -25,6 +25,7 @@ from mitsuba_diffraction.scene.fitted_mesh import (
     turned_around,
 )
 from mitsuba_diffraction.scene.meshes import has_texcoords, mesh_arrays
+from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
 
 FILE = Path("table.obj")
 
@@ -36,6 +37,12 @@ def table(up: int) -> np.ndarray:
     return np.roll(np.array(top + feet + [(3.5, 0.0, 3.0)]), up - 2, axis=1)
 
 
+def mesh(positions: np.ndarray, normal=(0.0, 0.0, 1.0)) -> TriangleMesh:
+    """A mesh of these vertices."""
+    normals = np.tile(normal, (len(positions), 1))
+    return TriangleMesh(positions, normals, None, np.array([[0, 1, 2]]))
+
+
 @given(
     st.sampled_from(UPS),
     st.floats(1e-4, 1e4),
@@ -43,34 +50,55 @@ def table(up: int) -> np.ndarray:
 )
 def test_a_fitted_mesh_stands_centred_on_the_floor(up, scale, shift):
     positions = scale * (table(2) + shift)
-    fit = fit_of(positions, FILE, up)
+    fit = fit_of(mesh(positions), FILE, up)
     placed = fit.scale * (positions @ fit.rotation.T) + fit.shift
     size = 1e-9 * np.abs(positions).max() * fit.scale + 1e-9  # rounding of the shift
     assert abs(placed[:, 2].min()) < size
     assert placed[:, 2].max() < STAGE_HEIGHT + size
     assert np.hypot(placed[:, 0], placed[:, 1]).max() < STAGE_RADIUS + size
     assert np.linalg.det(fit.rotation) == pytest.approx(1.0)
+    axis = np.eye(3)["xyz".index(fit.up[-1])] * (-1.0 if fit.up[0] == "-" else 1.0)
+    np.testing.assert_array_equal(fit.rotation @ axis, [0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize("name", ["a.ply", "a.obj"])
 @pytest.mark.parametrize(("axis", "up"), [(1, "y"), (2, "z")])
 def test_what_has_feet_stands_on_them(axis, up, name):
-    assert fit_of(table(axis), Path(name)).up == up
+    assert fit_of(mesh(table(axis)), Path(name)).up == up
 
 
 @pytest.mark.parametrize(
     ("positions", "said"),
     [
-        (np.zeros((4, 3)), "flat"),
-        (table(2) * [1.0, 1.0, 0.0], "flat"),
+        (np.zeros((4, 3)), "on a line"),
+        (table(2) * [1.0, 0.0, 0.0], "on a line"),
         (np.where(np.arange(3) == 1, np.nan, table(2)), "vertex 0 is not finite"),
     ],
 )
 def test_a_mesh_that_cannot_stand_is_refused(positions, said):
     with pytest.raises(DiffractionError, match=said):
-        fit_of(positions, FILE)
+        fit_of(mesh(positions), FILE)
     with pytest.raises(DiffractionError, match="choose one of"):
-        fit_of(table(2), FILE, "up")
+        fit_of(mesh(table(2)), FILE, "up")
+
+
+@pytest.mark.parametrize("name", ["a.ply", "a.obj"])
+@pytest.mark.parametrize("front", [*np.eye(3), *-np.eye(3), (0.36, 0.48, 0.8), (0.48, -0.8, 0.36)])
+def test_a_flat_mesh_leans_back_with_its_front_to_the_camera(front, name):
+    across = np.cross(front, np.roll(front, 1))
+    sheet = np.array([[a, b] for a in (-2, 2) for b in (3, 6)]) @ [across, np.cross(front, across)]
+    fit = fit_of(mesh(sheet.astype(np.float32), front), Path(name))
+    lean = np.radians(40.0)
+    assert fit.rotation @ front == pytest.approx([0.0, -np.cos(lean), np.sin(lean)], abs=1e-6)
+    assert np.linalg.det(fit.rotation) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("up", ["z", "-z"])
+def test_a_flat_mesh_lies_over_the_floor_where_its_axis_is_given(up):
+    sheet = table(2) * [1.0, 1.0, 0.0]
+    fit = fit_of(mesh(sheet), FILE, up)
+    heights = (fit.scale * (sheet @ fit.rotation.T) + fit.shift)[:, 2]
+    assert 0.0 < heights.min() == heights.max() < 0.1
 
 
 @example([(0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -2.5, 0.0), (1.0, 0.0, 0.0)], 1.0, 0.0, 1.0, 1.0)

@@ -55,9 +55,11 @@ def test_a_metal_replaces_what_is_there(surface):
     assert "Diffuse" in texts["elm__4"]
 
 
-def test_unknown_ids_are_answered_with_those_of_the_scene(surface):
-    with pytest.raises(DiffractionError, match="mat-Skin, mat-Ground, elm__0, elm__4"):
-        bsdfs(surface, {"mat-Scales": SETTINGS})
+def test_unknown_ids_are_answered_as_typed_with_those_of_the_scene(surface):
+    with pytest.raises(DiffractionError, match="mat-Skin, mat-Ground, elm__0, elm__4") as refused:
+        bsdfs(surface, {"Pant": SETTINGS})
+    assert "'Pant'" in str(refused.value)
+    assert "material:" not in str(refused.value)
 
 
 def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
@@ -101,13 +103,6 @@ def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surf
     assert text.count("Diffraction[") == text.count("brdf[")
     assert ("SmoothDiffuse" in text) == (name == "pigment")
     assert "material = Al" not in text
-
-
-def test_an_unknown_id_is_named_as_it_was_typed(surface):
-    with pytest.raises(DiffractionError, match="mat-Skin") as refused:
-        bsdfs(surface, {"Pant": SETTINGS})
-    assert "'Pant'" in str(refused.value)
-    assert "material:" not in str(refused.value)
 
 
 def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):

@@ -66,7 +66,7 @@ def in_one_process(scene: Path, frames: int) -> Seconds:
     for frame in requests(frames):
         loaded = load_scene(scene, frame.values)
         render_passes(
-            loaded, loaded.sensors()[0], spp=SPP, seed=0, variant=VARIANT, stop=Stop(),
+            loaded, loaded.sensors()[0], spp=SPP, seed=0, stop=Stop(),
             progress=silent,
         )  # fmt: skip
     return Seconds(time.perf_counter() - start, time.process_time() - before)

@@ -227,7 +227,7 @@ class Comparison:
     def _path_trace(self, scene: Any, sensor: Any, spp: int, seed: int, stop: Stop) -> Any:
         """Path-trace a picture (height, width, 3)."""
         result = render_passes(
-            scene, sensor, spp=spp, seed=seed, variant=self.variant, stop=stop,
+            scene, sensor, spp=spp, seed=seed, stop=stop,
             progress=self._stages.next(),
         )  # fmt: skip
         if result.interrupted:

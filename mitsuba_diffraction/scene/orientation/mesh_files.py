@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,18 +14,19 @@ from numpy.typing import NDArray
 
 from ...arrays import Whole
 from ...atomic import atomic_path
-from ...errors import DiffractionError, warn
+from ...errors import DiffractionError, one_line, warn
 from ...files import GLTF, MESHES, USD, readable_file
 from ..elements import ORIENTATION
-from ..meshes import mesh_arrays, with_relative_indices
+from ..meshes import mesh_arrays
+from ..mitsuba_errors import reason_of
 from .interchange import fans, interchange_mesh
-from .mesh_indices import FORMATS, any_line_begins, check_mesh, ply_header
+from .mesh_indices import FORMATS, check_mesh, ply_header, rests_of_lines
 from .trimesh import TriangleMesh, vertex_normals
 
-# What Mitsuba says before the mistake: places in its sources, its plugins, and the file
-_LOADING = re.compile(r'^.*(?:Error while loading \w+ file "[^"]*"|plugin of type "\w+"): ')
 # Errors of reading: Mitsuba's own, of text that is not UTF-8, of sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
+
+_NAMED = 4  # materials that a line lists
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
 
@@ -69,23 +69,18 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshFile:
         if mi.variant() is None:
             mi.set_variant("scalar_rgb")
         loaded = _load(file)
+        _warn_of_materials(file)
         if loaded.has_attribute(ORIENTATION):
             turns = np.array(loaded.attribute_buffer(ORIENTATION), dtype=np.float64)
             turns = turns.reshape(loaded.vertex_count(), -1)[:, :2]
         arrays = mesh_arrays(loaded)
         # Mitsuba's normals have seams where texture coordinates have
         arrays = arrays if _states_normals(file) else arrays._replace(normals=None)
-    faces, named = arrays.faces, np.zeros(len(arrays.positions), bool)
-    named[faces] = True
-    if not named.all():  # other vertices would count in the mesh's size
-        faces = (np.cumsum(named) - 1)[faces]
-    positions = arrays.positions[named]
-    own, uv, turns = (
-        None if rows is None else rows[named] for rows in (arrays.normals, arrays.uv, turns)
-    )
+    positions, own, uv, faces, materials = arrays
     normals = vertex_normals(positions, faces, uv) if own is None else own
     mesh = TriangleMesh(positions, normals, uv, faces, turns)
-    return MeshFile(file, mesh, own is not None, arrays.materials)
+    # other vertices would count in the mesh's size
+    return MeshFile(file, mesh.part(np.ones(len(faces), bool)), own is not None, materials)
 
 
 def load_mesh(path: str | os.PathLike[str]) -> TriangleMesh:
@@ -99,7 +94,19 @@ def _states_normals(file: Path) -> bool:
         header = ply_header(file, f"mesh '{file}'")
         vertex = [e for e in header.elements if e.name == "vertex"] if header else []
         return any(words[-1] == "nx" for element in vertex for words in element.properties)
-    return file.suffix.lower() != ".obj" or any_line_begins(file, b"vn")
+    return file.suffix.lower() != ".obj" or next(rests_of_lines(file, b"vn"), None) is not None
+
+
+def _warn_of_materials(file: Path) -> None:
+    """Say that the materials of an OBJ file have no effect, if it has any."""
+    if file.suffix.lower() != ".obj":
+        return
+    if names := list(dict.fromkeys(rests_of_lines(file, b"usemtl"))):
+        listed = ", ".join(names[:_NAMED]) + (", ..." if len(names) > _NAMED else "")
+        warn(
+            f"mesh '{file}': materials of OBJ files are not supported ({one_line(listed)}), the "
+            "mesh has one surface; export it as glTF (.glb) to give them surfaces by name"
+        )
 
 
 def _load(file: Path, **options: bool) -> mi.Mesh:
@@ -122,10 +129,8 @@ def _load(file: Path, **options: bool) -> mi.Mesh:
                 check_mesh(cut, kind, shown=shown)
                 with contextlib.suppress(*_UNREAD):
                     return mi.load_dict({"type": kind, "filename": str(cut)})
-        reason = _LOADING.sub("", " ".join(str(error).split())).rstrip("!. ")[-200:]
-        reason = with_relative_indices(reason)
         raise DiffractionError(
-            f"{shown}: cannot be read: {reason or type(error).__name__}; export it again"
+            f"{shown}: cannot be read: {reason_of(error)}; export it again"
         ) from error
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import struct
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -106,16 +107,18 @@ def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> None:
         triangles = _check_ply(file, shown)
     elif kind == "serialized":
         triangles = _check_serialized(file, number, shown)
-    elif kind == "obj" and not any_line_begins(file, b"f"):
+    elif kind == "obj" and next(rests_of_lines(file, b"f"), None) is None:
         triangles = 0
     if triangles == 0:
         raise DiffractionError(f"{shown}: it has no triangles")
 
 
-def any_line_begins(file: Path, word: bytes) -> bool:
-    """Whether a line of an OBJ file begins with a word."""
+def rests_of_lines(file: Path, word: bytes) -> Iterator[str]:
+    """Yield what follows a word, in the lines of an OBJ file that begin with this word."""
     with file.open("rb") as lines:
-        return any(line.lstrip().startswith((word + b" ", word + b"\t")) for line in lines)
+        for line in map(bytes.strip, lines):
+            if line.startswith((word + b" ", word + b"\t")):
+                yield line[len(word) :].strip().decode("utf-8", "replace")
 
 
 def ply_header(file: Path, shown: str) -> Header | None:

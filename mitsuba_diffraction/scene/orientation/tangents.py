@@ -112,7 +112,6 @@ class TangentReport:
     broken: float
     size: float  # longest side of the mesh along an axis
     has_orientation: bool = False
-    has_normals: bool = True  # of every mesh: readers make normals where a file has none
 
     @property
     def usable(self) -> bool:
@@ -181,7 +180,6 @@ class TangentReport:
         return {
             "triangles": self.triangles,
             "texture coordinates": self.has_uv,
-            "normals": self.has_normals,
             "direction of the patch": (
                 "none"
                 if not self.has_uv

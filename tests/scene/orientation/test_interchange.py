@@ -197,7 +197,7 @@ def test_edges_of_sixty_degrees_between_parts_of_the_texture_are_sharp(
 def test_the_axis_of_a_stage_is_its_own(tmp_path: Path) -> None:
     write_usd(tmp_path / "sheet.usda")
     mesh = load_mesh(tmp_path / "sheet.usda")
-    assert fit_of(mesh.positions, tmp_path / "sheet.usda").up == "z"
+    assert fit_of(mesh, tmp_path / "sheet.usda").up == "z"
 
 
 @pytest.mark.parametrize(
