@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.support.directions import Array, as_single, polar, uniform_directions
+from tests.support.directions import as_single, polar
 from tests.support.lanes import interaction, vectors
-from tests.support.layered import load
+from tests.support.layered import load, pairs
 from tests.support.stokes import matrices
 from tests.support.variants import use
 
@@ -24,15 +24,6 @@ THROUGH = {"plugin": "diffraction_dielectric", "int_ior": 1.5, "ext_ior": 1.0}
 def polarised() -> None:
     """The fastest polarised variant that runs."""
     use("llvm_ad_spectral_polarized", "scalar_spectral_polarized")
-
-
-def pairs(n: int = 60) -> tuple[Array, Array]:
-    rng = np.random.default_rng(5)
-    wi, wo = uniform_directions(n, rng, 0.2), uniform_directions(n, rng, 0.2)
-    near = slice(0, n // 2)
-    wo[near] = wi[near] * [-1, -1, 1]
-    wi[0], wo[1] = (0, 0, 1), (0, 0, 1)  # the normal, where a plane of incidence is any
-    return as_single(wi), as_single(wo)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +78,7 @@ def test_through_a_flat_dielectric_specular_light_is_mitsuba_s(polarised, mode, 
 
 @pytest.mark.parametrize("given", [CONDUCTOR, THROUGH, THROUGH | {"thin": True}])
 def test_the_first_entry_of_light_on_all_sides_is_that_of_unpolarised_variants(polarised, given):
-    wi, wo = pairs()
+    wi, wo, _ = pairs(60)
     turned = [1, 1, -1]
     cases = [(wi, wo * turned), (wi * turned, wo), (wi * turned, wo * turned), (wi, wo)]
     cases = [(as_single(a), as_single(b)) for a, b in cases]
