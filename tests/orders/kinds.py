@@ -14,7 +14,7 @@ from mitsuba_diffraction.optics.mirror import horizon_correction
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, blocks, cells
 from mitsuba_diffraction.orders.cells import Counts
 from tests.support import crossed
-from tests.support.directions import Array, as_single
+from tests.support.directions import Array, as_single, turned
 from tests.support.orders import listed_grating, load, shallow_grating, thin_grating
 
 
@@ -78,12 +78,6 @@ def loaded(kind: str, **more: Any) -> Any:
 def width_of(table: OrderTable) -> float:
     """Width of a surface's window, µm: of crossed gratings narrow, of lobes cut at the horizon."""
     return 8.0 if np.isfinite(table.periods[1]) else 65.0
-
-
-def turned(directions: Array, degrees: float) -> Array:
-    """Directions (n, 3) turned about the normal."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return directions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def sides_of(table: OrderTable) -> list[dict[str, bool]]:

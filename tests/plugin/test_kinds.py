@@ -14,7 +14,17 @@ import pytest
 
 from tests.support.directions import polar, uniform_directions
 from tests.support.furnace import sent_on
-from tests.support.kinds import KINDS, MIX, MIXED_SHEETS, MORE, THROUGH, check, lit, made
+from tests.support.kinds import (
+    KINDS,
+    MIX,
+    MIXED_SHEETS,
+    MORE,
+    THROUGH,
+    check,
+    check_matrices,
+    lit,
+    made,
+)
 from tests.support.lanes import evaluated
 from tests.support.variants import SOME, use
 
@@ -22,6 +32,7 @@ from tests.support.variants import SOME, use
 COLOURED = [kind for kind in KINDS if "surface" not in kind]
 THOROUGH = [pytest.param(kind, marks=pytest.mark.thorough) for kind in (*MORE, MIX, MIXED_SHEETS)]
 ALL = [*KINDS, *MORE, *THROUGH, MIX, MIXED_SHEETS]
+KNOWN = [name for name, kind in (KINDS | MORE).items() if kind.reference is not None]
 #: Layers that lose light also where the bare model, without conservation of energy, gains some.
 LOSING = [kind for kind in KINDS | MORE if kind.startswith(("coat", "film"))]
 #: Each kind in one variant, each variant with some kinds; of places, those with wavelengths.
@@ -38,6 +49,12 @@ def test_a_kind_is_the_reference_s(some_variant, kind):
 def test_a_kind_agrees_with_itself_in_colours_without_kernels(kind):
     use("scalar_rgb")
     check(kind, 4)
+
+
+@pytest.mark.parametrize("kind", KNOWN)
+def test_matrices_of_a_kind_are_the_reference_s(kind):
+    use("scalar_spectral_polarized")
+    check_matrices(kind)
 
 
 @pytest.mark.parametrize("kind", ["metal", *THROUGH, MIX])

@@ -13,7 +13,6 @@ from mitsuba_diffraction.plugin.description import describe
 from mitsuba_diffraction.plugin.varying import PRECISION
 from tests.support.gentle import directions, load, pairs
 from tests.support.lanes import bitmap, evaluated, refusal
-from tests.support.variants import SOME, VARIANTS, evaluate, use
 
 
 @pytest.mark.parametrize(
@@ -29,25 +28,6 @@ def test_a_picture_that_holds_no_directions_is_refused(every_variant, texture, m
     said = refusal(lambda: load(orientation=directions([10.0, 120.0, 200.0, 300.0], **texture)))
     assert said.startswith("orientation: ")
     assert re.search(mend, said)
-
-
-@pytest.mark.parametrize(
-    ("variant", "degrees"),
-    # (0.6, 0.8) is a multiple of 1/255: no reason to refuse it
-    [(VARIANTS[0], degrees) for degrees in (0.0, 53.13010235, 90.0, 45.0)]
-    + [pytest.param(variant, 25.0, marks=pytest.mark.thorough) for variant in SOME],
-)
-def test_a_picture_of_directions_turns_as_degrees_do(variant, degrees):
-    use(variant)
-    wi, wo, lam = pairs(20)
-    lam = np.tile(lam[:, None], 4)
-    samples = np.random.default_rng(3).random((20, 3))
-    found, expected = (
-        evaluate(load(orientation=by), wi, wo, samples, lam)[0]
-        for by in (directions([degrees] * 4), degrees)
-    )
-    # the angle's sine in single precision, times kσ = 16
-    assert found == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
 
 
 @pytest.mark.parametrize("bits", [8, 16])

@@ -17,6 +17,12 @@ def polar(theta: ArrayLike, phi: ArrayLike = 0.0) -> Array:
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
 
 
+def turned(directions: Array, degrees: float) -> Array:
+    """Directions (n, 3) turned about the normal."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return directions @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def as_single(values: Array) -> Array:
     """The values that single precision can hold, so that both sides get the same input."""
     return np.asarray(values, np.float32).astype(np.float64)

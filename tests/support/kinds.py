@@ -8,35 +8,54 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from tests.support.directions import Array, as_single
+from tests.support.directions import Array, as_single, turned
 from tests.support.lanes import with_bitmaps
 from tests.support.layered import PATCH, WIDTH, load, pairs
+from tests.support.stokes import matrices, reference_matrices
 from tests.support.transmitting import BELOW, INDICES, SIDES, both
 from tests.support.variants import evaluate
 
 METAL = {"eta": 0.9, "k": 6.0}
 COATED = METAL | {"coat_ior": 1.58}, METAL | {"coat": 1.58}
 FILMED = METAL | {"film_ior": 1.77, "film_thickness": 250.0}, METAL | {"film": (1.77, 250.0)}
+#: A quarter of the way from 100 to 700 nm.
+QUARTER = {
+    "film_thickness_min": 100.0, "film_thickness_max": 700.0,
+    "film_thickness": np.full((2, 2), 0.25),
+}  # fmt: skip
 PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}}
 PLANE = {"model": "kirchhoff"}
 SLOPE = {"model": "small_slope"}
-PLACED = {"coherence": "surface", "place": (0.0, 0.0)}
+ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0}
+PLACED = {"coherence": "surface"}
+WINDOW = {"coherence": "patch"}
 
 
 class Kind(NamedTuple):
     """Parameters of the plugin, and of the reference where it knows the kind.
 
-    Arrays are texels of a bitmap.
-    `stretch` and `height` are factors on the lengths and heights that the reference is given.
+    Arrays are texels of a bitmap. `stretch` and `height` are factors on the lengths and heights of
+    the reference's patch, which is turned by `turn` degrees.
     """
 
     parameters: dict[str, Any]
     reference: dict[str, Any] | None = None
     stretch: float = 1.0
     height: float = 1.0
+    turn: float = 0.0
+
+    def known(self, place: tuple[float, float] = (0.0, 0.0)) -> dict[str, Any]:
+        """Patch and parameters of the reference, for light at a place of surfaces."""
+        assert self.reference is not None
+        patch = md.HeightField(self.height * PATCH.heights, PATCH.pixel_size)
+        # stretched heights keep the table's window, which the light's limits
+        own = {"coherence_width": WIDTH * min(self.stretch, 1.0)} | self.reference
+        own |= {"place": place} if own.get("coherence") == "surface" else {}
+        return {"field": patch.stretched(self.stretch), **own}
 
 
 KINDS: dict[str, Kind] = {
@@ -46,8 +65,10 @@ KINDS: dict[str, Kind] = {
     "coat": Kind(COATED[0], COATED[1] | SLOPE),
     "film": Kind(FILMED[0], FILMED[1] | SLOPE),
     "pigment": Kind(INDICES | {"pigment": PIGMENT}),
-    "height scales": Kind({"material": "none", "height_scale": np.full((2, 2), 0.7)}),
-    "surface": Kind({"material": "none", "coherence": "surface", "uv_scale": 10.0}, PLACED),
+    "height scales": Kind(
+        {"material": "none", "height_scale": np.full((2, 2), 0.7)}, {}, height=0.7
+    ),
+    "surface": Kind({"material": "none"} | ON_SURFACE, PLACED),
     "narrower": Kind(INDICES | {"lateral_scale": 0.7}, SLOPE | {"eta": 1.5}, stretch=0.7),
 }
 #: Of `make test-all` alone.
@@ -61,12 +82,15 @@ MORE: dict[str, Kind] = {
         INDICES | {"film_ior": 2.4, "film_k": 0.1, "film_thickness": 150.0},
         SLOPE | {"eta": 1.5, "film": (2.4 + 0.1j, 150.0)},
     ),
-    "one window": Kind({"material": "none", "coherence": "patch"}, {"coherence": "patch"}),
+    "one window": Kind({"material": "none"} | WINDOW, WINDOW),
+    "one window of a metal": Kind(METAL | WINDOW, METAL | SLOPE | WINDOW),
     "turned, powers of the phase": Kind(
-        {"material": "none", "basis": "taylor", "orientation": 25.0, "height_scale": 0.8},
+        {"material": "none", "basis": "taylor", "orientation": 25.0, "height_scale": 0.8}, {},
+        height=0.8, turn=25.0,
     ),
     "turned by a picture": Kind(
-        {"material": "none", "orientation": np.tile([0.6, 0.8, 0.0], (2, 2, 1))},
+        {"material": "none", "orientation": np.tile([-0.6, 0.8, 0.0], (2, 2, 1))}, {},
+        turn=126.86989765,
     ),
     "in its own shade": Kind(METAL | {"shadowing": "vcavity"}),
     "dielectric, tangent plane": Kind(INDICES | PLANE, PLANE | {"eta": 1.5}),
@@ -74,11 +98,16 @@ MORE: dict[str, Kind] = {
     "coat, tangent plane": Kind(COATED[0] | PLANE, COATED[1] | PLANE),
     "film, tangent plane": Kind(FILMED[0] | PLANE, FILMED[1] | PLANE),
     "film, lower": Kind(FILMED[0] | {"height_scale": 0.5}, FILMED[1] | SLOPE, height=0.5),
+    "film of a picture, lower": Kind(
+        FILMED[0] | QUARTER | PLANE | {"height_scale": 0.5}, FILMED[1] | PLANE, height=0.5
+    ),
     "coat, narrower": Kind(COATED[0] | {"lateral_scale": 0.7}, COATED[1] | SLOPE, stretch=0.7),
     "wider": Kind({"material": "none", "lateral_scale": 1.4}, {}, stretch=1.4),
     "surface, narrower": Kind(
-        {"material": "none", "coherence": "surface", "uv_scale": 10.0, "lateral_scale": 0.7},
-        PLACED, stretch=0.7,
+        {"material": "none", "lateral_scale": 0.7} | ON_SURFACE, PLACED, stretch=0.7
+    ),
+    "surface under a coat, narrower": Kind(
+        COATED[0] | ON_SURFACE | {"lateral_scale": 0.7}, COATED[1] | SLOPE | PLACED, stretch=0.7
     ),
 }  # fmt: skip
 
@@ -109,20 +138,33 @@ def exact(kind: str, wi: Array, wo: Array, wavelengths: Array) -> Array | None:
     Radiance of what goes through is that of equal media on both sides.
     """
     kind = {MIX: "mirror", MIXED_SHEETS: "through a sheet"}.get(kind, kind)
-    stretch, height, function = 1.0, 1.0, reference.brdf
     if kind in THROUGH:
         own = SLOPE | {"eta": 1.5} | THROUGH[kind]
-        stretch, function = own.pop("lateral_scale", 1.0), reference.btdf
+        like, function = Kind({}, own, own.pop("lateral_scale", 1.0)), reference.btdf
     else:
-        _, known, stretch, height = (KINDS | MORE)[kind]
-        if known is None:
-            return None
-        own = known
-    patch = md.HeightField(height * PATCH.heights, PATCH.pixel_size).stretched(stretch)
-    # stretched heights keep the table's window, which the light's limits
-    own = {"coherence_width": WIDTH * min(stretch, 1.0)} | own
-    columns = [function(patch, wi, wo, one, **own) for one in wavelengths.T]
+        like, function = (KINDS | MORE)[kind], reference.brdf
+    if like.reference is None:
+        return None
+    known, pair = like.known(), (turned(wi, -like.turn), turned(wo, -like.turn))
+    patch = known.pop("field")
+    columns = [function(patch, *pair, one, **known) for one in wavelengths.T]
     return np.stack(columns, axis=1) * np.abs(wo[:, 2:])
+
+
+#: Where light falls; v runs against the second axis of the frame.
+_UV = np.array([0.4, -0.9])
+_HIT = {"uv": _UV.tolist(), "dp_du": [1, 0, 0], "dp_dv": [0, -1, 0]}
+
+
+def check_matrices(kind: str) -> None:
+    """Compare matrices of a kind that reflects with the reference, in a polarised variant."""
+    like = (KINDS | MORE)[kind]
+    wi, wo, lam = (part[[8, -1]] for part in lit(kind, 200))  # near the mirror direction, and far
+    found = matrices(made(kind), wi, wo, lam, **_HIT)
+    known = like.known(tuple(10.0 * _UV * [1, -1]))
+    expected = reference_matrices(known.pop("field"), wi, wo, lam, like.turn, **known)
+    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+    assert_allclose(found, expected, rtol=1e-3, atol=1e-5 * expected.max())
 
 
 def lit(kind: str, count: int) -> tuple[Array, Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mitsuba_diffraction import HeightField, reference
-from tests.support.directions import Array
+from tests.support.directions import Array, turned
 from tests.support.lanes import interaction, vectors
 
 #: Reversed light has the same s, so the other p.
@@ -57,11 +57,26 @@ def matrices(
 
 
 def reference_matrices(
-    field: HeightField, wi: Array, wo: Array, wavelengths: ArrayLike, **model: Any
+    field: HeightField,
+    wi: Array,
+    wo: Array,
+    wavelengths: ArrayLike,
+    turn: float = 0.0,
+    **model: Any,
 ) -> Array:
-    """The same by the reference, of light that arrives along ωo, as where radiance is followed."""
+    """The same by the reference, of light that arrives along ωo, as where radiance is followed.
+
+    A perfect conductor, which has no `eta`, depolarises.
+
+    turn : of the patch, degrees.
+    """
     s_in, s_out = reference.boundary.polarisation_axes(wo, wi)
     before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)
     lam = np.broadcast_to(wavelengths, (len(wi), 4))
-    known = [after @ reference.mueller(field, wo, wi, one, **model) @ before for one in lam.T]
+    light = field, turned(wo, -turn), turned(wi, -turn)
+    if "eta" in model:
+        known = [after @ reference.mueller(*light, one, **model) @ before for one in lam.T]
+    else:
+        powers = (reference.brdf(*light, one, **model) for one in lam.T)
+        known = [power[:, None, None] * np.diag([1.0, 0.0, 0.0, 0.0]) for power in powers]
     return np.stack(known, axis=1) * wo[:, None, 2, None, None]

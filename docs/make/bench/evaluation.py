@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -63,7 +63,7 @@ _COLUMNS = ("mean ΔE2000", "99th percentile", "pixels")
 
 def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Nanoseconds for `eval` of four wavelengths, of every contender and of the bare gathers."""
-    queries = {slow: _queries(plan, slow) for slow in (False, True)}
+    queries = {False: Queries.random(plan.lanes), True: Queries.random(plan.slow_lanes)}
     context = mi.BSDFContext()
     calls: dict[str, Callable[[], Any]] = {}
     lanes: dict[str, int] = {}
@@ -99,16 +99,10 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
 
 def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
     """Nanoseconds for `sample`, `eval_pdf` and `pdf`, beside those of `eval` in the same rounds."""
-    queries = _queries(plan, False)
-    context, factories = mi.BSDFContext(), bsdf_factories(tables)
-    drawing = (context, queries.si, queries.sample1, queries.sample2)
-    calls: dict[str, Callable[[], Any]] = {}
+    factories = bsdf_factories(tables)
     names = (ALUMINIUM, DEFAULT, DEFAULT_AL)
-    for name in names:
-        bsdf = factories[name]()
-        calls[f"sample {name}"] = partial(bsdf.sample, *drawing)
-        for what in ("eval", "eval_pdf", "pdf"):
-            calls[f"{what} {name}"] = partial(getattr(bsdf, what), context, queries.si, queries.wo)
+    bsdfs = {name: factories[name]() for name in names}
+    calls = calls_of(bsdfs, ("sample", "eval", "eval_pdf", "pdf"), plan.lanes)
     timed, sections = time_calls(plan, calls, "eval, sample and pdf", progress), []
     for what, most in (("sample", 1.5), ("eval_pdf", 1.15), ("pdf", None)):
         evals = {
@@ -128,10 +122,6 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
     return sections
 
 
-def _queries(plan: Plan, slow: bool) -> Queries:
-    return Queries.random(plan.slow_lanes if slow else plan.lanes)
-
-
 class Timed(NamedTuple):
     """Times of a call in rounds, in ns a lane: of the clock and of all cores; its operations."""
 
@@ -139,6 +129,22 @@ class Timed(NamedTuple):
     processor: list[float]
     lanes: int
     operations: int
+
+
+def calls_of(
+    bsdfs: Mapping[str, Any], functions: Iterable[str], lanes: int
+) -> dict[str, Callable[[], Any]]:
+    """Return calls of functions of BSDFs, by the names of both, with random numbers of lanes."""
+    queries, context = Queries.random(lanes), mi.BSDFContext()
+    drawn = queries.sample1, queries.sample2
+    return {
+        f"{what} {name}": partial(
+            getattr(bsdf, what), context, queries.si,
+            *(drawn if what == "sample" else (queries.wo,)),
+        )
+        for what in functions
+        for name, bsdf in bsdfs.items()
+    }  # fmt: skip
 
 
 def called(timed: Mapping[str, Timed], what: str) -> dict[str, Timed]:

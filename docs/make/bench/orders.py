@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
 
-from mitsuba_diffraction.analysis.timing import Queries, ratio
+from mitsuba_diffraction.analysis.timing import ratio
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.progress import Progress
 
 from .contenders import ALUMINIUM
-from .evaluation import called, time_calls, timed_section
+from .evaluation import called, calls_of, time_calls, timed_section
 from .figures import Goal, Plan, Row, Section
 from .scenes import NOISE, noise_row
 
@@ -43,18 +42,7 @@ def _load(table: Path) -> Any:
 
 
 def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
-    queries, context = Queries.random(plan.lanes), mi.BSDFContext()
-    numbers = queries.sample1, queries.sample2
-    calls = {
-        f"{what} {name}": partial(
-            getattr(bsdf, what),
-            context,
-            queries.si,
-            *(numbers if what == "sample" else (queries.wo,)),
-        )
-        for what in _TIMES
-        for name, bsdf in bsdfs.items()
-    }
+    calls = calls_of(bsdfs, _TIMES, plan.lanes)
     timed, sections = time_calls(plan, calls, "orders", progress), []
     for what, most in _TIMES.items():
         times = called(timed, what)

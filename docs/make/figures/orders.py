@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import mitsuba as mi
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -25,7 +25,7 @@ from mitsuba_diffraction.optics.display import natural
 from mitsuba_diffraction.scene import load_scene, read_exr, set_variant
 
 from . import pages
-from .pages import option, program, write_jpeg
+from .pages import option, program
 
 #: Largest size of a picture, bytes.
 _MOST = 150_000
@@ -164,7 +164,8 @@ def _show(model: Rendered, solved: Rendered, difference: Real, target: Path) -> 
     target.parent.mkdir(parents=True, exist_ok=True)
     with Image.open(model.display) as picture:
         height = 4.6 * picture.height / picture.width + 0.35
-    fig, axes = plt.subplots(1, 3, figsize=(14.4, height), dpi=100, layout="constrained")
+    fig = Figure(figsize=(14.4, height), dpi=100, layout="constrained")
+    axes = fig.subplots(1, 3)
     for ax, title, rendered in zip(axes, ("model", "solved"), (model, solved), strict=False):
         with Image.open(rendered.display) as picture:
             ax.imshow(np.asarray(picture.convert("RGB")))
@@ -174,11 +175,7 @@ def _show(model: Rendered, solved: Rendered, difference: Real, target: Path) -> 
     fig.colorbar(drawn, ax=axes[2], label="ΔE2000", extend="max")
     for ax in axes:
         ax.axis("off")
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "joined.png"
-        fig.savefig(file)
-        plt.close(fig)
-        write_jpeg(file, target, most=_MOST)
+    pages.write_figure(target, fig, most=_MOST)
 
 
 @program(

@@ -109,13 +109,21 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def write_figure(path: Path, figure: Figure, dpi: float | None = None) -> None:
-    """Write a figure as PNG without the name of its software: equal figures are equal files.
+def write_figure(
+    path: Path, figure: Figure, dpi: float | None = None, *, most: int | None = None
+) -> None:
+    """Write a figure as JPEG or PNG, without the name of its software: equal figures, equal files.
 
     dpi : of the picture; None is that of the figure.
+    most : bytes of a JPEG, as in `write_jpeg`.
     """
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=dpi or "figure", metadata={"Software": None})
+    if path.suffix == ".jpg":
+        write_jpeg(picture, path, most=most)
+        return
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=dpi or "figure", metadata={"Software": None})
+        temporary.write_bytes(picture.getvalue())
 
 
 def run(*words: object) -> None:
@@ -134,7 +142,7 @@ def run(*words: object) -> None:
 
 
 def write_jpeg(
-    source: Path, target: Path, *, width: int | None = None, most: int | None = None
+    source: Path | io.BytesIO, target: Path, *, width: int | None = None, most: int | None = None
 ) -> None:
     """Write a picture as JPEG.
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from mitsuba_diffraction import OrderTable
 
 from . import pages
-from .pages import option, program, write_jpeg
+from .pages import option, program
 
 #: The command of the page.
 COMMAND = (
@@ -69,8 +69,7 @@ def main(args: argparse.Namespace) -> None:
         for (_, file), option in zip(files.items(), ([], ["--polarised"]), strict=True):
             pages.run(*COMMAND, *option, "-o", file)
         table = OrderTable.load(files["Mueller matrices"])
-        figure(table).savefig(folder / "figure.png", dpi=110)
-        write_jpeg(folder / "figure.png", picture)
+        pages.write_figure(picture, figure(table), 110)
         cost = costs(files)
     caption = (
         f"Unpolarised light from {_THETA:g}° on this grating, across the grooves. Left: "

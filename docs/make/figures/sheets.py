@@ -11,22 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from docs.make.validation.cases import direction
+from docs.make.validation.cases import Case, Light, Media, Sampled
 from docs.make.validation.compare import misplaced
-from docs.make.validation.light import heights_of, light_of
-from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.geometry import sigma_of
-from mitsuba_diffraction.orders import solve
+from docs.make.validation.light import heights_of, solved_by
+from docs.make.validation.model import modelled
+from mitsuba_diffraction.orders.solve import IntegralSolver
 from mitsuba_diffraction.orders.solve.profiles import Profile, sinusoidal
 
 from . import pages
 from .pages import option, program
 
-_INDEX, _WIDTH = 1.58, 65.0
-_WAVELENGTHS, _THETAS, _PHIS = (460.0, 610.0), (0.0, 30.0, 60.0), (0.0, 60.0)
+_MEDIA = Media(1.58, through=True, thin=True)
+_NM, _THETAS, _PHIS = (460.0, 610.0), (0.0, 30.0, 60.0), (0.0, 60.0)
 
 
-class Case(NamedTuple):
+class Sheet(NamedTuple):
     """Sheet, and the points of its solution, which 1.4 times as many change by 0.1 % at most."""
 
     title: str
@@ -34,51 +33,36 @@ class Case(NamedTuple):
     points: int
 
 
-CASES = (
-    Case("250 lines/mm, 0.22 µm (`film.xml`)", sinusoidal(4.0, 0.22), 200),
-    Case("600 lines/mm, 0.09 µm (`spectrometer.xml`)", sinusoidal(1.6667, 0.09), 120),
-    Case("1000 lines/mm, 0.3 µm", sinusoidal(1.0, 0.3), 120),
+SHEETS = (
+    Sheet("250 lines/mm, 0.22 µm (`film.xml`)", sinusoidal(4.0, 0.22), 200),
+    Sheet("600 lines/mm, 0.09 µm (`spectrometer.xml`)", sinusoidal(1.6667, 0.09), 120),
+    Sheet("1000 lines/mm, 0.3 µm", sinusoidal(1.0, 0.3), 120),
 )
 
 
-def row(case: Case) -> tuple[str, ...]:
-    """Return the cells of a case: mean misplaced share of the transmitted orders, by angle."""
-    cells_of = []
+def row(sheet: Sheet) -> tuple[str, ...]:
+    """Return the cells of a sheet: mean misplaced share of the transmitted orders, by angle."""
+    surface, shares = Sampled(heights_of(sheet.profile)), []
+    solver = IntegralSolver(sheet.profile, sheet.points)
     for theta in _THETAS:
-        missed = [
-            _missed(case, theta, phi, lam)
-            for phi in (_PHIS if theta else (0.0,))
-            for lam in _WAVELENGTHS
-        ]
-        cells_of.append(f"{np.mean(missed):.0%}")
-    return (case.title, *cells_of)
+        lights = [Light(lam, theta, phi) for phi in (_PHIS if theta else (0.0,)) for lam in _NM]
+        missed = [_missed(solver, Case(surface, light, _MEDIA)) for light in lights]
+        shares.append(f"{np.mean(missed):.0%}")
+    return (sheet.title, *shares)
 
 
-def _missed(case: Case, theta: float, phi: float, wavelength: float) -> float:
+def _missed(solver: IntegralSolver, case: Case) -> float:
     """Return Σ|model − solution| over Σ solution, of the transmitted orders but 0."""
-    wi, period = direction(theta, phi), case.profile.period
-    station, channel = light_of(period, 1e-3 * wavelength, _INDEX, -wi[0], -wi[1], thin=True)
-    amplitudes = solve.IntegralSolver(case.profile, case.points).amplitudes(station)
-    powers = solve.sheet_efficiencies(amplitudes, station)[0, channel]
-    solved = powers[:, station.channels :].mean(axis=0).sum(axis=-1)
-    orders = channel - np.arange(station.channels)
-    x = orders * wavelength / (1e3 * period) - wi[0]
-    y = np.full(len(x), -wi[1])
-    wo = np.stack([x, y, -np.sqrt(1.0 - x**2 - y**2)], axis=-1)
-    # the power of a lobe from the value at its centre
-    width = sigma_of(_WIDTH) * 2e3 * np.pi / wavelength
-    values = reference.btdf(
-        heights_of(case.profile, 64, 4), np.tile(wi, (len(wo), 1)), wo, wavelength,
-        eta=_INDEX, thin=True, coherence_width=_WIDTH,
-    )  # fmt: skip
-    others = orders != 0
-    return misplaced(values * np.pi / width**2, solved, others)
+    solved = solved_by(solver, case)
+    values = modelled(case, solved.order, "small_slope")
+    sides = (part.mean(axis=1) for part in (values, solved.powers))
+    return misplaced(*sides, solved.order[:, 0] != 0)
 
 
 @program(option("-o", "--output", type=Path, default=Path("docs"), help="of the page"))
 def main(args: argparse.Namespace) -> None:
     """Write the table of the page."""
     header = ("sinusoidal sheet of index 1.58", *(f"{theta:g}°" for theta in _THETAS))
-    text = pages.table(header, [row(case) for case in CASES])
+    text = pages.table(header, [row(sheet) for sheet in SHEETS])
     text += "\n\n`python -m docs.make.figures.sheets` makes this table."
     pages.update(args.output / "orders.md", {"sheets": text})

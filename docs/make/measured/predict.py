@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from docs.make.validation.cases import Case, Light, Media, Sampled, in_plane
-from docs.make.validation.light import heights_of, light_of, solved_by
+from docs.make.validation.cases import Case, Light, Media, Sampled
+from docs.make.validation.light import heights_of, solved_by
 from docs.make.validation.model import modelled
-from mitsuba_diffraction import reference
 from mitsuba_diffraction.arrays import Real
-from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.orders.solve import Chandezon, IntegralSolver, Solver, material_of
 from mitsuba_diffraction.orders.solve.profiles import Profile
 
@@ -52,11 +50,14 @@ def _littrow(material: str, profile: Profile, wavelengths: Real) -> list[Case]:
     return _cases(material, profile, wavelengths, angles)
 
 
-def _cases(material: str, profile: Profile, wavelengths: Real, angles: Real | float) -> list[Case]:
+def _cases(
+    material: str | float, profile: Profile, wavelengths: Real, angles: Real | float,
+    through: bool = False,
+) -> list[Case]:  # fmt: skip
     surface = Sampled(heights_of(profile))
     lights = np.broadcast_arrays(wavelengths, angles)
     return [
-        Case(surface, Light(lam, theta), Media(index_of(material, lam)))
+        Case(surface, Light(lam, theta), Media(index_of(material, lam), through=through))
         for lam, theta in zip(*(each.tolist() for each in lights), strict=True)
     ]
 
@@ -88,27 +89,18 @@ def through_solved(
 
     solver : by default the integral method, as fine as 1e-3 needs.
     """
-    solver, period = solver or IntegralSolver(profile, 120), profile.period
-    values = []
-    for lam in 1e-3 * wavelengths:
-        station, middle = light_of(period, lam, index + 0j, 0.0, 0.0, thin=True)
-        within = station.channels + np.flatnonzero(station.inside == middle)[0]
-        ports = (within, middle - 1) if outwards else (middle, within - 1)
-        powers = np.abs(solver.amplitudes(station)[0, ports[0], :, ports[1]]) ** 2
-        values.append(powers.sum(axis=-1).mean())
-    return np.array(values) * face(index)
+    solver = solver or IntegralSolver(profile, 120)
+    found = [solved_by(solver, case) for case in _through(index, outwards, profile, wavelengths)]
+    powers = [orders.powers[orders.order[:, 0] == 1].mean() for orders in found]
+    return np.array(powers) * face(index)
 
 
 def through_modelled(index: float, outwards: bool, profile: Profile, wavelengths: Real) -> Real:
     """Order −1 of light along the normal through the grooves, by the model."""
-    field, values = heights_of(profile), []
-    for lam in wavelengths:
-        sine = 1e-3 * lam / profile.period
-        lit = np.array([0.0, 0.0, -1.0 if outwards else 1.0])
-        leaves = in_plane(sine) if outwards else in_plane(sine / index) * [1, 1, -1]
-        btdf = reference.btdf(
-            field, lit, leaves[None], lam,
-            eta=index, coherence_width=WIDTHS_PER_SIGMA * profile.period, model=_MODEL,
-        )  # fmt: skip
-        values.append(float(btdf[0]) * np.pi / (profile.period * float(wavenumber(lam))) ** 2)
+    cases = _through(index, outwards, profile, wavelengths)
+    values = [modelled(case, np.array([[1, 0]]), _MODEL).mean() for case in cases]
     return np.array(values) * face(index)
+
+
+def _through(index: float, outwards: bool, profile: Profile, wavelengths: Real) -> list[Case]:
+    return _cases(index, profile, wavelengths, 180.0 if outwards else 0.0, through=True)

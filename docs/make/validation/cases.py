@@ -124,7 +124,7 @@ class Media:
     material : of `index_of`, or "perfect".
     film : index and thickness (nm) of a film over the surface.
     coat : index of a clear coat; `once` leaves out the light that its face sends back.
-    through : whether the orders are those that go through.
+    through : whether the orders are those that go through, and with `thin` through a sheet.
     """
 
     material: str | complex
@@ -132,6 +132,7 @@ class Media:
     coat: float | None = None
     once: bool = False
     through: bool = False
+    thin: bool = False
 
     @property
     def layer(self) -> dict[str, Any]:
@@ -177,14 +178,15 @@ class Case:
         return self.surface.field
 
     def wo(self, order: Whole) -> Real:
-        """Directions (n, 3) of orders (n, 2), below the surface if they go through."""
+        """Directions (n, 3) of orders (n, 2), on the other side if they go through."""
         step = self.light.wavelength / 1000 / np.array(self.field.extent)
-        tangential = order * step - self.wi[:2]
-        if self.media.through:
-            assert self.index is not None
-            tangential /= self.index.real
+        index, above = complex(self.index or 1.0).real, self.wi[2] > 0
+        # a sheet has air on both sides
+        within = index if self.media.through and not self.media.thin else 1.0
+        came, left = (1.0, within) if above else (within, 1.0)
+        tangential = (order * step - came * self.wi[:2]) / left
         up = np.sqrt(np.maximum(1 - np.sum(tangential**2, axis=1), 0))
-        return np.column_stack([tangential, -up if self.media.through else up])
+        return np.column_stack([tangential, -up if self.media.through and above else up])
 
     def has(self, **values: Any) -> bool:
         """Whether surface, light and media have these values, or one of a list of them."""

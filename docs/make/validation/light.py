@@ -64,14 +64,23 @@ def powers_of(solver: Solver, light: Beam) -> dict[int, Real]:
 
 
 def solved_by(solver: Solver, case: Case) -> Orders:
-    """Return the reflected orders of a case by a solver of the package."""
+    """Return the orders of a case by a solver of the package."""
     assert case.index is not None
-    (x, y, _), period, media = case.wi, case.field.extent[0], case.media
+    (x, y, z), period, media = case.wi, case.field.extent[0], case.media
     films = () if media.film is None else media.film[:1]
-    light = light_of(period, 1e-3 * case.light.wavelength, case.index, -x, y, *films)
-    powers = powers_of(solver, light)
-    order = np.array([(m, 0) for m in sorted(powers)])
-    return Orders(order, np.array([powers[m] for m, _ in order]))
+    lit = period, 1e-3 * case.light.wavelength, case.index, -x, y, *films
+    station, channel = light_of(*lit, thin=media.through)
+    amplitudes, n = solver.amplitudes(station), station.channels
+    powers = (
+        solve.sheet_efficiencies(amplitudes, station) if media.thin else np.abs(amplitudes) ** 2
+    )
+    # ports below follow those above
+    came = channel if z > 0.0 else n + int(np.argmax(station.inside == channel))
+    left = slice(n, None) if media.through == (z > 0.0) else slice(0, n)
+    ports = station.inside if left.start and not media.thin else np.arange(n)
+    by_order = powers[0, came, :, left].sum(axis=-1)
+    order = np.stack([channel - ports, 0 * ports], axis=1)
+    return Orders(order[::-1], by_order.T[::-1])
 
 
 def heights_of(profile: Profile, pixels: int = PIXELS, rows: int = 2) -> HeightField:

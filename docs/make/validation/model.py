@@ -135,6 +135,7 @@ def modelled(case: Case, order: Whole, model: str) -> Real:
         btdf = reference.btdf(
             case.field, wi, wo, wavelength,
             eta=index.real, coherence_width=WIDTHS_PER_SIGMA * LOBE_SIGMA, model=model,
+            thin=media.thin,
         )  # fmt: skip
         mean = np.pi / (LOBE_SIGMA * float(wavenumber(wavelength))) ** 2 * btdf
     else:

@@ -158,8 +158,9 @@ def contact_sheet(
     *,
     title: str,
     exposure: float | None = None,
+    columns: int = _MOST_COLUMNS,
 ) -> Figure:
-    """Draw maps in rows of up to four, each with its title.
+    """Draw maps in rows, each with its title.
 
     Parameters
     ----------
@@ -167,10 +168,11 @@ def contact_sheet(
     titles : one for each map; two lines at most.
     title : title of the whole sheet.
     exposure : stops for all maps; by default, each map has its own, which its title states.
+    columns : largest number of maps in a row.
     """
     from matplotlib.figure import Figure
 
-    columns = min(len(maps), _MOST_COLUMNS)
+    columns = min(len(maps), columns)
     rows = math.ceil(len(maps) / columns)
     side = max(1.02 * max(m.resolution for m in maps) / _DPI, _SMALLEST_SIDE)
     width, height = (side + 0.2) * columns + 0.6, (side + 0.55) * rows + 0.8

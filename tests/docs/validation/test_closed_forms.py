@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import mitsuba_diffraction as md
-from docs.make.validation.cases import PROFILES, WAVELENGTHS, Grating, in_plane, order_sines
-from docs.make.validation.closed_forms import ANGLES, deviations, order_power
+from docs.make.validation.cases import PROFILES, Grating
+from docs.make.validation.closed_forms import deviations, order_power
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
-from mitsuba_diffraction.optics.mirror import horizon_correction
-from tests.support.directions import as_single
-from tests.support.lanes import brdf_values
 
 
 @pytest.mark.parametrize(("period", "depth"), [(1.1, 0.4), (2.5, 0.1)])
@@ -24,47 +19,6 @@ def test_orders_hold_within_1e_4_up_to_75_degrees(profile, period, depth):
     # tolerance 3e-5
     assert found.integral < 3e-5
     assert found.table < 6e-5
-
-
-@pytest.mark.parametrize("profile", PROFILES)
-def test_the_renderer_s_orders_hold_within_1e_4_up_to_75_degrees(variant, profile):
-    import mitsuba as mi
-
-    grating, sigma = Grating(profile, 2.5, 0.4), 2.5
-    strip = grating.heights(256)
-    # a window much wider than the patch is refused
-    wide = md.HeightField(np.tile(strip.heights, (4, 1)), strip.pixel_size)
-    bsdf = mi.load_dict(
-        md.bsdf_dict(
-            wide, material="none", energy_conserving=False,
-            coherence_width=4 * sigma, tolerance=1e-4,
-        )
-    )  # fmt: skip
-    wi, wo, wavelengths, orders = lobe_centres(grating)
-    value = brdf_values(bsdf, wi, wo, wavelengths[:, None])
-    scale = kirchhoff_factor(wi, wo, wavelengths, sigma) * 4 * np.pi**2 * sigma**4
-    # so narrow a window's lobe of order 0 reaches beyond the horizon, eq. 10
-    levels = (sigma * each[:, 2] ** 2 for each in (wi, wo))
-    visible = horizon_correction(*levels, wavenumber(wavelengths))
-    scale *= np.where(orders == 0, visible, 1.0)
-    exact = order_power(grating, orders, wavenumber(wavelengths) * (wi + wo)[:, 2])
-    assert len(orders) > 300
-    assert np.abs(value / scale - exact).max() < 1e-4
-
-
-def lobe_centres(grating: Grating) -> tuple[np.ndarray, ...]:
-    """wi, wo (n, 3), wavelengths (n,) and orders (n,), all exact in single precision."""
-    found = []
-    for wavelength in WAVELENGTHS:
-        for theta in ANGLES:
-            orders, sines = order_sines(grating.period, wavelength, theta)
-            keep = np.abs(sines) <= np.sin(np.radians(75.0)) + 1e-9
-            outgoing = in_plane(sines[keep])
-            incident = np.broadcast_to(in_plane(np.sin(np.radians(theta))), outgoing.shape)
-            lam = np.full(len(outgoing), wavelength)
-            found.append((as_single(incident), as_single(outgoing), lam, orders[keep]))
-    wi, wo, wavelengths, orders = (np.concatenate(column) for column in zip(*found, strict=True))
-    return wi, wo, wavelengths, orders
 
 
 @pytest.mark.parametrize("profile", PROFILES)

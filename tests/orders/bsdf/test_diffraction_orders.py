@@ -10,15 +10,13 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.orders import OrderTable
-from tests.orders.kinds import BLOCK, KINDS, albedo_of, loaded, near_orders
-from tests.support import crossed
+from tests.orders.kinds import KINDS, albedo_of, loaded, near_orders
 from tests.support.directions import as_single, polar, uniform_directions
 from tests.support.furnace import furnace_in
 from tests.support.lanes import evaluated
-from tests.support.orders import PERIOD, listed_grating, load, thin_grating
+from tests.support.orders import PERIOD, load, thin_grating
 from tests.support.variants import evaluate
 
-TABLE, SHEET, LISTED = thin_grating(), thin_grating(thin=True), listed_grating()
 WHITE = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
 #: Relative errors of rows of the sums of efficiencies.
 BENEATH = {"grooves": 0.05, "crossed": 0.3}
@@ -32,14 +30,15 @@ def test_light_from_a_listed_direction_is_seen_from_all_directions(some_variant)
     across = orders * lam / (1e3 * PERIOD) - sine
     seen = np.column_stack([across, 0.0 * across, np.sqrt(1.0 - across**2)])
     light = np.zeros((len(orders), 3)), np.full((len(orders), 4), lam)
-    table = load(LISTED, wavelength=lam)
+    listed = KINDS["listed"]()
+    table = load(listed, wavelength=lam)
     forth = evaluate(table, lamp, seen, *light)[0] / seen[:, 2:]
     back = evaluate(table, seen, lamp, *light)[0] / lamp[:, 2:]
     assert back == pytest.approx(forth, rel=5e-3 if mi.is_rgb else 1e-3)
     # the list's light, but for half floats
-    truth = TABLE.efficiency(-sine, 0.0, lam, orders)
-    assert LISTED.efficiency(-sine, 0.0, lam, orders) == pytest.approx(truth, rel=2e-3)
-    assert LISTED.efficiency(-across, 0.0, lam, orders) == pytest.approx(truth, rel=2e-3)
+    truth = KINDS["grooves"]().efficiency(-sine, 0.0, lam, orders)
+    for x in (sine, across):
+        assert listed.efficiency(-x, 0.0, lam, orders) == pytest.approx(truth, rel=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -91,21 +90,21 @@ def test_a_surface_beneath_gets_the_light_that_is_in_no_order(some_variant, kind
 
 
 @pytest.mark.parametrize(
-    ("table", "parameters", "message"),
+    ("kind", "parameters", "message"),
     [
-        (TABLE, {"coherence_width": 2.0}, "periods"),
-        (TABLE, {"orientations": 1.0}, "orientation"),
-        (TABLE, {"coat_ior": 1.5}, "is a parameter of the plugin 'diffraction'"),
-        (SHEET, {"beneath": {"type": "diffuse"}}, "thin sheet"),
-        (BLOCK, {"beneath": {"type": "diffuse"}}, "block, beneath"),
-        (crossed.table(), {"film_ior": 1.3}, "film_ior"),
-        (crossed.table(), {"height_scale": 1.3}, "height_scale"),
-        (crossed.table(), {"lateral_scale": 1.3}, "lateral_scale"),
+        ("grooves", {"coherence_width": 2.0}, "periods"),
+        ("grooves", {"orientations": 1.0}, "orientation"),
+        ("grooves", {"coat_ior": 1.5}, "is a parameter of the plugin 'diffraction'"),
+        ("sheet", {"beneath": {"type": "diffuse"}}, "thin sheet"),
+        ("block", {"beneath": {"type": "diffuse"}}, "block, beneath"),
+        ("crossed", {"film_ior": 1.3}, "film_ior"),
+        ("crossed", {"height_scale": 1.3}, "height_scale"),
+        ("crossed", {"lateral_scale": 1.3}, "lateral_scale"),
     ],
 )
-def test_unfit_parameters_are_refused_in_one_line(some_variant, table, parameters, message):
+def test_unfit_parameters_are_refused_in_one_line(some_variant, kind, parameters, message):
     with pytest.raises(Exception, match=message) as caught:
-        load(table, **parameters)
+        load(KINDS[kind](), **parameters)
     assert isinstance(caught.value.__cause__ or caught.value, (DiffractionError, RuntimeError))
 
 

@@ -20,10 +20,9 @@ from tests.orders.kinds import (
     light_of,
     loaded,
     near_orders,
-    turned,
 )
 from tests.support.chi_square import DISPERSED, Case, chi_square
-from tests.support.directions import polar, uniform_directions
+from tests.support.directions import polar, turned, uniform_directions
 from tests.support.lanes import evaluated, interaction, vectors
 from tests.support.variants import evaluate
 

@@ -15,7 +15,6 @@ from scipy.io import netcdf_file
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.orders.listing import list_orders
-from tests.orders.kinds import light
 from tests.support.orders import thin_grating
 
 HEADER = "wavelength_nm,theta_deg,phi_deg,order,R_s,R_p\n"
@@ -64,16 +63,6 @@ def table(lines, tmp_path_factory):
     file = tmp_path_factory.mktemp("csv") / "bench.csv"
     file.write_text(HEADER + "".join(lines))
     return md.read_orders(file, PERIOD)  # without a warning
-
-
-def test_efficiencies_of_a_file_come_back(truth, table):
-    at = light(40, 0.8, (510.0, 630.0))
-    for m in (-1, 0, 1):
-        # linear interpolation between lights 5 degrees and 35 nm apart
-        error = np.abs(table.efficiency(*at, m) - truth.efficiency(*at, m))
-        assert error.mean() < 0.01
-    assert table.header["error_mean"] < 0.05
-    assert table.header["reciprocity_error"] < 0.05
 
 
 def write_classic(path, axes, variables, units):

@@ -11,6 +11,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
 from mitsuba_diffraction.reference.boundary import mueller
 from mitsuba_diffraction.reference.model import small_slope
+from tests.orders.kinds import light
 from tests.support.orders import groove_matrices, shallow_grating
 from tests.support.stokes import REVERSAL
 
@@ -19,15 +20,12 @@ GRATING = shallow_grating(INDEX, 0.1)
 LORENTZ = np.diag([1.0, -1.0, -1.0, -1.0])
 
 
-def light(n=100):
-    """Directions over the hemisphere but its rim, and wavelengths."""
-    rng = np.random.default_rng(2)
-    radius, turn_ = np.sqrt(rng.uniform(0.0, 0.97, n)), rng.uniform(0.0, 2.0 * np.pi, n)
-    return radius * np.cos(turn_), radius * np.sin(turn_), rng.uniform(500.0, 600.0, n)
+#: Directions over the hemisphere but its rim, and wavelengths.
+LIGHT = light(100, 0.985, GRATING.wavelengths, seed=2)
 
 
 def test_matrices_between_nodes_are_those_of_the_model():
-    x, y, lam = light()
+    x, y, lam = LIGHT
     for m in (0, 1):
         tangential = x + m * lam / (1e3 * GRATING.period)
         seen = np.abs(tangential) < 0.98 * np.sqrt(1.0 - y**2)
@@ -43,7 +41,7 @@ def test_matrices_between_nodes_are_those_of_the_model():
 
 @pytest.mark.parametrize("m", [0, 1])
 def test_matrices_are_those_of_jones_matrices_with_the_table_s_efficiency(m):
-    x, y, lam = light()
+    x, y, lam = LIGHT
     matrices, power = (look_up(x, y, lam, m) for look_up in (GRATING.mueller, GRATING.efficiency))
     assert matrices[:, 0, 0] == pytest.approx(power, abs=1e-12)
     # M^T G M = √det(M) G of pure matrices (Barakat 1981): no input gains polarisation
@@ -55,7 +53,7 @@ def test_matrices_are_those_of_jones_matrices_with_the_table_s_efficiency(m):
 
 @pytest.mark.parametrize("m", [0, 1])
 def test_reversed_light_has_the_transposed_matrix(m):
-    x, y, lam = light()
+    x, y, lam = LIGHT
     there = GRATING.mueller(x, y, lam, m)
     back = GRATING.mueller(-x - m * lam / (1e3 * GRATING.period), -y, lam, m)
     expected = REVERSAL @ there.swapaxes(1, 2) @ REVERSAL
