@@ -13,6 +13,7 @@ from ...optics.boundary import MODELS
 from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Feature, Surface
+from ...progress import show, tracked
 from ...tables.colour.table import cached_colours
 from ...tables.directional import DirectionalTable
 from .lobes import colour_power, pack_lobes
@@ -63,9 +64,12 @@ class Modelled:
 
     def conservation(self, scales: Sequence[float]) -> Packed:
         """Pack energy conservation and the base's light, one page per height scale."""
-        excesses = [self.described.albedo_excess(scale) for scale in scales]
-        pages = [self.described.energy_scale(scale) for scale in scales]
-        return pack_directions(excesses, [None if s is None else luminous_mean(s) for s in pages])
+        excesses, pages = [], []
+        for scale in tracked(scales, show, "scales of energy"):
+            excesses.append(self.described.albedo_excess(scale))
+            page = self.described.energy_scale(scale)
+            pages.append(None if page is None else luminous_mean(page))
+        return pack_directions(excesses, pages)
 
     def tables(self, method: str) -> Packed:
         """Pack the table for `fast` or `exact`."""
