@@ -47,6 +47,12 @@ class Modelled:
             f"height scale {described.height_scale.number:g}"
         )
 
+    @property
+    def height_room(self) -> float:
+        """Largest factor on the height scale that the table serves."""
+        scale = self._coat * self.described.height_scale.number
+        return self.described.patch.height_scale_max / max(scale, 1e-9)
+
     def surface(self) -> Packed:
         """Pack constants and definitions that all methods share."""
         described = self.described

@@ -44,14 +44,15 @@ class PackedScene:
     ----------
     scene : a `mi.Scene` of the current variant, or an XML file.
     sensor : index of the camera.
-    heights : factors on the height scales for which energy scales are packed, one page each.
+    octaves : log2 of factors on the height scales for which energy scales are packed, a page each.
 
     Attributes
     ----------
     diffracting : one surface of each table.
+    octaves : those of the parameter whose heights all tables serve.
     """
 
-    def __init__(self, scene: Any, sensor: int = 0, heights: Sequence[float] = (1.0,)) -> None:
+    def __init__(self, scene: Any, sensor: int = 0, octaves: Sequence[float] = (0.0,)) -> None:
         self.mitsuba_scene = load(scene)
         self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
         tables: dict[int, Diffracting] = {}
@@ -59,6 +60,9 @@ class PackedScene:
             tables.setdefault(id(surface.described.table), surface)
         self.diffracting = tuple(tables.values())
         numbers = {key: number for number, key in enumerate(tables)}
+        room = min(surface.height_room for surface in self.scene.diffracting)
+        self.octaves = tuple(n for n in octaves if 2.0**n <= max(room, 1.0))
+        heights = [2.0**n for n in self.octaves]
         self.surfaces = tuple(
             PackedSurface(
                 surface,

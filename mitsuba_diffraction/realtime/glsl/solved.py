@@ -29,6 +29,8 @@ _DIRECTIONS, _WAVELENGTHS = 32, 24
 class SolvedSurface:
     """Table of solved orders of a surface as textures and constants."""
 
+    height_room = np.inf  # nothing depends on a height scale
+
     def __init__(self, described: Surface, table: OrderTable) -> None:
         self.described, self.table = described, table
 

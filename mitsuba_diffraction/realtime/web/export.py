@@ -101,7 +101,7 @@ def make_page(
         title = Path(scene).stem if is_file else "Diffraction"
     progress(0, 0, "reading the scene")
     with showing(progress):
-        packed = PackedScene(scene, sensor, [2.0**n for n in OCTAVES])
+        packed = PackedScene(scene, sensor, OCTAVES)
         writer = _Writer(packed, bounces, progress)
     header, data = writer.written(title, methods, view, progress)
     text = _filled(header, data)
@@ -208,8 +208,8 @@ class _Writer:
             "around": self._around,
             "materials": self._materials,
             # ends of the slider of height scales, and pages of energy scales
-            "octaves": (OCTAVES[0], OCTAVES[-1]),
-            "energy_pages": len(OCTAVES),
+            "octaves": (self._packed.octaves[0], self._packed.octaves[-1]),
+            "energy_pages": len(self._packed.octaves),
             **self._tables(fitted),
             **self._shaded(fitted),
             **_shaders(view),
