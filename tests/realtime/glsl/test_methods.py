@@ -35,10 +35,8 @@ from mitsuba_diffraction.realtime.glsl.source import (
     vertex_source,
 )
 from mitsuba_diffraction.realtime.glsl.texels import (
-    PAGE,
     Packed,
     half_error,
-    listed,
     paired,
     shortened,
 )
@@ -285,13 +283,6 @@ def test_the_logs_of_other_compilers_are_understood(log: str) -> None:
 def test_an_unknown_method_is_refused_with_the_choices() -> None:
     with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of fast, exact"):
         fragment_parts("phong", {})
-
-
-def test_lists_keep_their_order_over_rows() -> None:
-    entries = np.arange(2 * PAGE + 10, dtype=np.float32)[:, None].repeat(4, axis=1)
-    data = listed("numbers", entries).data
-    assert data.shape == (3, PAGE, 4)
-    np.testing.assert_array_equal(data.reshape(-1, 4)[: len(entries)], entries)
 
 
 def test_half_floats_are_taken_where_they_hold(table: DiffractionTable) -> None:
