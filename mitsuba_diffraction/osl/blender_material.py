@@ -398,15 +398,11 @@ def _output(arguments: argparse.Namespace) -> Path | None:
         raise MaterialError("--slot is of an object: name it by --object")
     if arguments.output:
         return Path(arguments.output)
-    if not arguments.blend:
-        if bpy.app.background and not bpy.data.filepath:
-            raise MaterialError("nothing would be saved: name a file by --output, or by --blend")
-        return _beside(Path(bpy.data.filepath)) if bpy.app.background else None
-    return _beside(arguments.blend)
-
-
-def _beside(file: Path) -> Path:
-    """Return the name of a copy of a file."""
+    file: Path = arguments.blend or Path(bpy.data.filepath)
+    if not (arguments.blend or bpy.app.background):
+        return None
+    if not file.name:
+        raise MaterialError("nothing would be saved: name a file by --output, or by --blend")
     copy = file.with_name(f"{file.stem}_diffraction.blend")
     if copy.exists():
         raise MaterialError(f"'{copy}' is there already: name a file by --output, it or another")

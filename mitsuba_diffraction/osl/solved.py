@@ -23,7 +23,9 @@ def interpolation_error(table: OrderTable, packed: PackedOrders) -> dict[str, fl
     """Return errors of the centres of the texture's cells, as shares of the incident light."""
     differences = []
     for of in kinds_of(table):
-        centre, through, read = centres(table, of, packed.counts, np.float16)
+        centre, through, read = centres(
+            table, of, packed.counts, lambda nodes: nodes.astype(np.float16)
+        )
         # transmittance of the face for light of a channel; what cannot leave is never seen
         face = (through / np.maximum(centre, 1e-30)).max(axis=-2)
         face = np.where(face > _TRAPPED, face, 0.0)

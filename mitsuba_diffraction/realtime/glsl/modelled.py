@@ -56,7 +56,8 @@ class Modelled:
     def surface(self) -> Packed:
         """Pack constants and definitions that all methods share."""
         described = self.described
-        definitions, uniforms = {"DIFFRACTING": ""}, dict[str, Uniform]()
+        definitions = {"DIFFRACTING": ""}
+        uniforms: dict[str, Uniform] = {"height_scale": described.height_scale.number}
         if described.shadowing:
             definitions["VCAVITY"] = ""
         if described.coat is not None:

@@ -24,21 +24,17 @@ from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene
 from ..glsl.shader_materials import Diffracting
-from ..glsl.source import (
-    display_definitions,
-    fragment_parts,
-    plain_source,
-    vertex_source,
-)
+from ..glsl.source import display_definitions, fragment_parts, web_source
 from .light import packed_light, packed_surroundings
-from .material_choices import INDEXED, changeable, packed_materials
+from .material_choices import INDEXED, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
 from .tables import DIGITS, strongest_orders, web_table
 
 #: Largest size of a page, bytes.
 MAX_BYTES = 25_000_000
 
-#: Height scales of the tables for energy conservation, log2 of the factor on the scene's scale.
+#: Height scales of the tables for energy conservation, log2 of the factor on the scene's scale; a
+#: page has those that its tables serve.
 OCTAVES = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5)
 
 #: Upper bound of a page's shaders, scripts and styles, bytes.
@@ -316,23 +312,26 @@ class _Writer:
 
 
 def _coat(surface: PackedSurface) -> float | None:
-    """Return the index of a surface's coat, 1 without one; None if its material cannot change."""
+    """Return the index of a surface's coat, 1 without one; None if its material cannot change.
+
+    The materials of solved orders and of mirrors cannot.
+    """
     diffraction = surface.scene.material.diffraction
-    if diffraction is None or not changeable(diffraction):
+    if diffraction is None or diffraction.described.index is None:
         return None
     return diffraction.described.coat or 1.0
 
 
 def _shaders(view: str) -> dict[str, Any]:
     """Return the sources that do not depend on surfaces."""
-    display = plain_source(
-        "shown.frag", ("library.glsl", "formulas"), display_definitions(view), "web"
+    display = web_source(
+        "library.glsl", "formulas", "shown.frag", definitions=display_definitions(view)
     )
     return {
         "mains": {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")},
-        "vertex": vertex_source("web"),
-        "shadow": plain_source("position.frag", dialect="web"),
-        "shown": {"vertex": vertex_source("web", "whole.vert"), "fragment": display},
+        "vertex": web_source("surface.vert"),
+        "shadow": web_source("position.frag"),
+        "shown": {"vertex": web_source("whole.vert"), "fragment": display},
     }
 
 

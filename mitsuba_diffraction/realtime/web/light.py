@@ -17,7 +17,7 @@ from ...progress import Progress
 from ..glsl.lights import Lamp
 from ..glsl.packed_scene import PackedScene
 from ..glsl.packing import WAVENUMBERS, pack_responses
-from ..glsl.source import plain_source
+from ..glsl.source import web_source
 from ..glsl.texels import shortened
 from .sections import Sections, converted, packed_array, packed_parts
 
@@ -110,8 +110,10 @@ def packed_surroundings(
     lobes = [converted(part, digits) for part in packed.lobes]
     background = None
     if packed.emitters.environment is not None:
-        shared = ("library.glsl", "surroundings.glsl")
-        background = plain_source("background.frag", shared, packed.around.definitions, "web")
+        background = web_source(
+            "library.glsl", "surroundings.glsl", "background.frag",
+            definitions=packed.around.definitions,
+        )  # fmt: skip
     return {
         "bounces": bounces,
         "parts": packed_parts(parts, sections),

@@ -23,7 +23,7 @@ from mitsuba_diffraction.realtime.glsl.shader_materials import (
     pack_surface,
     packed_by,
 )
-from mitsuba_diffraction.realtime.glsl.source import display_definitions, plain_source
+from mitsuba_diffraction.realtime.glsl.source import display_definitions, joined, source_parts
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed, shaded
 from tests.support.descriptions import CHANGES, ELSEWHERE, base
@@ -128,7 +128,8 @@ void main() { fragment = vec4(displayed(texelFetch(light, ivec2(gl_FragCoord.xy)
 def test_shader_and_numpy_show_the_same(gl, view):
     light = ramp()
     rows, columns, _ = light.shape
-    source = plain_source("shown.frag", ("library.glsl", "formulas"), display_definitions(view))
+    files = ("library.glsl", "formulas", "shown.frag")
+    source = joined(source_parts(files, display_definitions(view)))
     source = source.partition("// Picture of a page")[0] + SHOW
     parts = Packed((Texture("light", np.pad(light, [(0, 0)] * 2 + [(0, 1)])),))
     found = drawn(gl, source, parts, (columns, rows)).reshape(light.shape)
