@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from .texels import PAGE, Packed, Texture, Uniform, distinct_rows
 
 #: Required version of OpenGL, 3.3.
 REQUIRED = 330
+
+Owned = TypeVar("Owned")
 
 _INSTALL = "apt install libegl1 libgl1 libgl1-mesa-dri"
 
@@ -88,7 +90,7 @@ def compile_program(
 class Resources:
     """Owner of resources of OpenGL, which are freed together."""
 
-    def own(self, resource: Any) -> Any:
+    def own(self, resource: Owned) -> Owned:
         """Add a resource that `release` frees, and return it."""
         self.__dict__.setdefault("_owned", []).append(resource)
         return resource

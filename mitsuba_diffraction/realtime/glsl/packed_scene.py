@@ -104,31 +104,26 @@ class PackedScene:
 
     @cached_property
     def around(self) -> Packed:
-        """Environment, and flat shapes with their light, for shaders/surroundings.glsl."""
+        """All that lobes look up, for shaders/surroundings.glsl and shaders/obstacles.glsl.
+
+        An environment, flat shapes with their light, and distances to all other shapes without.
+        """
         assert self.emitters is not None
+        flats = flat_shapes(self.mitsuba_scene)
         extent = float(np.ptp([self.scene.low, self.scene.high]))
-        packed = pack_flats(self._flats, self.emitters.share_of)
+        packed = pack_flats(flats, self.emitters.share_of)
         packed |= Packed((), {"least_distance": 1e-6 * extent})
         if (environment := self.emitters.environment) is not None:
             packed |= environment.packed(self.emitters.share_of(environment.emitter))
-        return packed
-
-    @cached_property
-    def obstacles(self) -> Packed:
-        """Distances to all other shapes that obstruct directions, for shaders/obstacles.glsl."""
-        flat = {shape.ptr for shape in self._flats}
+        flat = {shape.ptr for shape in flats}
         solid: list[NDArray[np.float32]] = [
             surface.vertices[:, :3].reshape(-1, 3, 3)
             for surface in self.scene.surfaces
             if surface.shape.ptr not in flat and surface.radiance is None
         ]
-        return pack_obstacles(np.concatenate(solid)) if solid else Packed()
+        return packed | pack_obstacles(np.concatenate(solid)) if solid else packed
 
     @cached_property
     def bounces(self) -> Packed:
         """Light between surfaces, for shaders/bounces.glsl; takes seconds to trace."""
         return pack_bounces(self.mitsuba_scene, self.scene)
-
-    @cached_property
-    def _flats(self) -> list[Any]:
-        return flat_shapes(self.mitsuba_scene)

@@ -50,25 +50,20 @@ class Stage(Resources):
             raise DiffractionError(NO_LIGHT)
         self.emitters = packed.emitters
         self.casters = self.own(Casters(context, packed.scene, buffers))
-        self._around = self._bound(packed.around)
-        self._obstacles = self._bound(packed.obstacles)
-        self._lobes = [self._bound(lobes) for lobes in packed.lobes]
+        self._around = self.own(Bindings(context, packed.around))
+        self._lobes = [self.own(Bindings(context, lobes)) for lobes in packed.lobes]
         self._background: ShaderPass | None = None
         if self.emitters.environment is not None:
             files = ("library.glsl", "surroundings.glsl", "background.frag")
             self._background = self.own(ShaderPass(context, *files, **self._around.definitions))
         self.looks_up = packed.looks_up
 
-    def _bound(self, packed: Packed) -> Bindings:
-        """Upload packed data."""
-        bindings: Bindings = self.own(Bindings(self.context, packed))
-        return bindings
-
     def extras(self, bounces: bool) -> list[list[Bindings]]:
         """Return the bindings of each surface: surroundings, lobes, and light between surfaces."""
-        shared = [self._around, self._obstacles]
+        shared = [self._around]
         if bounces:
-            self._bounces = self._bounces or self._bound(self._packed.bounces)
+            if self._bounces is None:
+                self._bounces = self.own(Bindings(self.context, self._packed.bounces))
             shared.append(self._bounces)
         return [
             shared + ([] if surface.table is None else [self._lobes[surface.table]])
@@ -113,8 +108,6 @@ class ProgressiveLight(Resources):
         self._map = self.own(ShadowMap(stage.casters, shadow_size))
         # a frame, and the sum of each kind of frames
         self._frame, *self._sums = (self.own(Target(context, *camera.size)) for _ in range(3))
-        self._counts = [0, 0]
-        self._lights: Iterator[Lamp] = iter(())
         self._visible = stage.casters.visible(camera)
         self.restart()
         self._add = self.own(ShaderPass(context, "add.frag"))
@@ -131,7 +124,9 @@ class ProgressiveLight(Resources):
         self._counts = [0, 0]
         self._drawn: Counter[tuple[str, bool]] = Counter()  # number of frames of each emitter
         emitters = self._stage.emitters
-        self._lights = itertools.cycle(self._fixed) if self._fixed else emitters.lights()
+        self._lights: Iterator[Lamp] = (
+            itertools.cycle(self._fixed) if self._fixed else emitters.lights()
+        )
 
     def advance(self, frames: int = 1) -> None:
         """Add this many frames."""

@@ -69,7 +69,7 @@ class Renderer(Resources):
         self.buffers = [
             self.own(VertexBuffer(self.context, s.vertices)) for s in self.scene.surfaces
         ]
-        self.bindings = [self._bound(surface.packed) for surface in self.packed.surfaces]
+        self.bindings = [self.own(Bindings(self.context, s.packed)) for s in self.packed.surfaces]
         self._tables: dict[str, list[Bindings]] = {}
         self._programs: dict[object, Any] = {}
         self._arrays: dict[object, Any] = {}
@@ -237,18 +237,14 @@ class Renderer(Resources):
             self._responses.release()
         super().release()
 
-    def _bound(self, packed: Packed) -> Bindings:
-        """Upload packed data."""
-        bindings: Bindings = self.own(Bindings(self.context, packed))
-        return bindings
-
     def tables(self, method: str) -> list[Bindings]:
         """Return a method's table of each surface, uploaded at the first call; empty without one.
 
         Raises a DiffractionError if the method is unknown, or does not support a table.
         """
         if method not in self._tables:
-            bound = [self._bound(packed) for packed in (*self.packed.tables(method), Packed())]
+            tables = (*self.packed.tables(method), Packed())
+            bound = [self.own(Bindings(self.context, packed)) for packed in tables]
             numbers = (-1 if s.table is None else s.table for s in self.packed.surfaces)
             self._tables[method] = [bound[number] for number in numbers]
         return self._tables[method]

@@ -100,7 +100,7 @@ def packed_surroundings(
     if packed.emitters is None or not (packed.looks_up or bounces):
         return None, {}
     progress(0, 3, _PACKING)
-    parts = packed.around | converted(packed.obstacles, {"obstacles": _coarser})
+    parts = converted(packed.around, {"obstacles": _coarser})
     progress(1, 3, _PACKING)
     if bounces:
         parts |= packed.bounces
