@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
 
 #: Called as progress(done, total, text); a total of 0 is not known yet.
 Progress = Callable[[int, int, str], None]
+
+_Part = TypeVar("_Part")
 
 
 def silent(done: int, total: int, text: str) -> None:
@@ -30,6 +33,13 @@ def showing(progress: Progress) -> Iterator[None]:
 def show(done: int, total: int, text: str) -> None:
     """Progress callback of a BSDF that loads: that of the innermost `showing`."""
     _shown[-1](done, total, text)
+
+
+def tracked(parts: Sequence[_Part], progress: Progress, text: str) -> Iterator[_Part]:
+    """Yield parts of the work while a callback shows their number: each takes up to seconds."""
+    for number, part in enumerate(parts):
+        progress(number, len(parts), text)
+        yield part
 
 
 class Stages:

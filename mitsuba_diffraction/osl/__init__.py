@@ -3,7 +3,7 @@
 Contents
 --------
 export            write a shader with its textures and the script into a folder
-solved            texture and constants of a table of solved orders
+solved            constants of a table of solved orders, and the error of its texture
 patch             textures and constants of a patch of heights
 formulas          formulas of optics that the shaders call, as functions in OSL
 spectrum          wavelengths that a shader draws, and their colours

@@ -20,7 +20,8 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -263,13 +264,18 @@ def _link_tangent(nodes: Any, links: Any, surface: Any, tangent: str) -> None:
 
 def _link_hologram(nodes: Any, links: Any, surface: Any, orientation: Any, stretch: Any) -> None:
     """Link pictures of a hologram to the inputs of a group."""
+
+    def channels_of(file: Any, height: float) -> Any:
+        channels = _node(nodes, "ShaderNodeSeparateColor", (-700, height))
+        links.new(_picture(nodes, file, (-1000, height)).outputs["Color"], channels.inputs[0])
+        return channels.outputs
+
     if orientation is not None:
-        channels = _node(nodes, "ShaderNodeSeparateColor", (-700, 200))
-        links.new(_picture(nodes, orientation, (-1000, 200)).outputs["Color"], channels.inputs[0])
+        cosine, sine, _ = channels_of(orientation, 200)
         angle, degrees = (_node(nodes, "ShaderNodeMath", (x, 200)) for x in (-520, -360))
         angle.operation, degrees.operation = "ARCTAN2", "DEGREES"
-        links.new(channels.outputs[1], angle.inputs[0])
-        links.new(channels.outputs[0], angle.inputs[1])
+        links.new(sine, angle.inputs[0])
+        links.new(cosine, angle.inputs[1])
         links.new(angle.outputs[0], degrees.inputs[0])
         links.new(degrees.outputs[0], surface.inputs["Rotation (°)"])
     if stretch is not None:
@@ -277,14 +283,12 @@ def _link_hologram(nodes: Any, links: Any, surface: Any, orientation: Any, stret
             raise MaterialError(
                 "solved orders cannot be stretched; export a patch of heights for --stretch"
             )
-        channels = _node(nodes, "ShaderNodeSeparateColor", (-700, -320))
-        links.new(_picture(nodes, stretch, (-1000, -320)).outputs["Color"], channels.inputs[0])
-        links.new(channels.outputs[0], surface.inputs["Stretch"])
+        links.new(channels_of(stretch, -320)[0], surface.inputs["Stretch"])
 
 
 def _masked(nodes: Any, links: Any, surface: Any, weight: Any) -> Any:
     """Return a mix of plain metal and a group, by a picture of the group's share."""
-    mix, blank = _node(nodes, "ShaderNodeMixShader", (320, 0)), None
+    mix = _node(nodes, "ShaderNodeMixShader", (320, 0))
     blank = _node(nodes, "ShaderNodeBsdfAnisotropic", (60, 300))
     blank.inputs["Roughness"].default_value = 0.25  # of the slopes: α = 0.06
     blank.inputs["Color"].default_value = (0.9, 0.9, 0.9, 1.0)
@@ -296,15 +300,22 @@ def _masked(nodes: Any, links: Any, surface: Any, weight: Any) -> Any:
 
 def _picture(nodes: Any, file: Any, location: tuple[float, float]) -> Any:
     """Return a node of a picture whose texels are numbers and are not interpolated."""
-    path = Path(file).resolve()
-    try:
-        image = bpy.data.images.load(str(path), check_existing=True)
-    except RuntimeError as error:
-        raise MaterialError(f"cannot read the picture '{file}'") from error
+    with _naming(f"cannot read the picture '{file}'"):
+        image = bpy.data.images.load(str(Path(file).resolve()), check_existing=True)
     image.colorspace_settings.name = "Non-Color"
     node = _node(nodes, "ShaderNodeTexImage", location)
     node.image, node.interpolation = image, "Closest"
     return node
+
+
+@contextmanager
+def _naming(text: str) -> Iterator[None]:
+    """Raise a MaterialError of this text, with Blender's reason, where Blender refuses a file."""
+    try:
+        yield
+    except RuntimeError as error:
+        reason = str(error).strip().splitlines()[0].removeprefix("Error: ")
+        raise MaterialError(f"{text}: {reason}") from error
 
 
 def _node(nodes: Any, kind: str, location: tuple[float, float]) -> Any:
@@ -353,7 +364,8 @@ def run(words: Sequence[str]) -> None:
     check_blender()
     output = _output(arguments)
     if arguments.blend:
-        _open(arguments.blend)
+        with _naming(f"cannot open '{arguments.blend}'"):
+            bpy.ops.wm.open_mainfile(filepath=str(arguments.blend.resolve()), load_ui=False)
     if arguments.working_space:
         _set_working_space(arguments.working_space)
     folders = [arguments.folder] if arguments.folder else _folders()
@@ -371,7 +383,10 @@ def run(words: Sequence[str]) -> None:
     else:
         material.use_fake_user = True  # kept in the file while no object has it
     if output:
-        _save(output)
+        if not output.parent.is_dir():
+            raise MaterialError(f"cannot write '{output}': its folder does not exist")
+        with _naming(f"cannot write '{output}'"):
+            bpy.ops.wm.save_as_mainfile(filepath=str(output.resolve()), check_existing=False)
     print(
         f"added the material '{material.name}' of {folder}" + (f", in {output}" if output else "")
     )
@@ -383,28 +398,15 @@ def _output(arguments: argparse.Namespace) -> Path | None:
         raise MaterialError("--slot is of an object: name it by --object")
     if arguments.output:
         return Path(arguments.output)
-    if not arguments.blend:
-        if bpy.app.background and not bpy.data.filepath:
-            raise MaterialError("nothing would be saved: name a file by --output, or by --blend")
-        return _beside(Path(bpy.data.filepath)) if bpy.app.background else None
-    return _beside(arguments.blend)
-
-
-def _beside(file: Path) -> Path:
-    """Return the name of a copy of a file."""
+    file: Path = arguments.blend or Path(bpy.data.filepath)
+    if not (arguments.blend or bpy.app.background):
+        return None
+    if not file.name:
+        raise MaterialError("nothing would be saved: name a file by --output, or by --blend")
     copy = file.with_name(f"{file.stem}_diffraction.blend")
     if copy.exists():
         raise MaterialError(f"'{copy}' is there already: name a file by --output, it or another")
     return copy
-
-
-def _open(file: Path) -> None:
-    """Open a .blend file in place of the open one."""
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(file.resolve()), load_ui=False)
-    except RuntimeError as error:
-        reason = str(error).strip().splitlines()[0].removeprefix("Error: ")
-        raise MaterialError(f"cannot open '{file}': {reason}") from error
 
 
 def _set_working_space(name: str) -> None:
@@ -418,15 +420,6 @@ def _set_working_space(name: str) -> None:
         if _SHADER in group:
             for node in (n for n in group.nodes if n.type == "SCRIPT"):
                 node.inputs["Working Space"].default_value = name
-
-
-def _save(output: Path) -> None:
-    if not output.parent.is_dir():
-        raise MaterialError(f"cannot write '{output}': its folder does not exist")
-    try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(output.resolve()), check_existing=False)
-    except RuntimeError as error:
-        raise MaterialError(f"cannot write '{output}': {str(error).strip()}") from error
 
 
 def main() -> None:

@@ -21,6 +21,8 @@ from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES, linear_srgb, response
 from ..orders import OrderTable
 from ..plugin.description import Consumer, Feature, Surface
+from ..shading import dialects
+from ..shading.orders import pack_orders
 from ..tables import write_channels
 from .formulas import order_formulas, patch_formulas, shader_file
 from .patch import (
@@ -31,7 +33,7 @@ from .patch import (
     patch_textures,
 )
 from .sockets import Socket, array_parameter, sockets_of
-from .solved import interpolation_error, order_constants, order_texture
+from .solved import MOST_BYTES, interpolation_error, order_constants
 from .spectrum import NODES, drawn_spectrum
 
 #: Script that adds the material to a .blend file, copied into the folder.
@@ -60,16 +62,6 @@ OSL = Consumer(
         Feature.TRANSMISSION: "export a table of the reflecting side, or render it with Mitsuba",
     },
 )  # fmt: skip
-
-#: Words of OSL's grammar, in use and kept for later (OSL language specification, section 2).
-_RESERVED = (
-    "and break closure color continue do else emit float for if illuminance illuminate int matrix "
-    "normal not or output point public return string struct vector void while bool case catch char "
-    "class const delete default double enum extern false friend goto inline long new operator "
-    "private protected short signed sizeof static super switch template this throw true try "
-    "typedef uniform union unsigned varying virtual volatile shader surface displacement volume "
-    "light"
-)
 
 _HEAD = "// {surface}; made by mitsuba_diffraction {version}.\n"
 
@@ -181,7 +173,7 @@ def check_name(name: str) -> None:
     files = (shader_file(file) for file in ("common.osl", "patch.osl", "orders.osl"))
     formulas = [order_formulas(), *(patch_formulas(model, True) for model in MODELS.values())]
     source = re.sub('"[^"]*"', "", re.sub("//.*", "", "\n".join([*files, *formulas])))
-    if name in _RESERVED.split() or re.search(rf"\b{name}\b", source):
+    if name in dialects.OSL.reserved or re.search(rf"\b{name}\b", source):
         raise DiffractionError(
             f"name='{name}' is a word of the Open Shading Language or of the shaders' source; "
             f"choose another of {allowed}, for example 'my_{name}'"
@@ -196,16 +188,16 @@ def shader_of(described: Surface) -> OslShader:
 
 
 def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) -> OslShader:
-    texture = order_texture(table)
+    packed = pack_orders(table, MOST_BYTES)
     return OslShader(
         "orders.osl",
         order_formulas(),
-        order_constants(table, texture),
-        [array_parameter("int", "Starts", texture.starts)],
+        order_constants(table, packed),
+        [],
         sockets_of({"CoherenceWidth": described.coherence_width, **placed}),
-        {"OrdersFile": texture.pixels},
+        {"OrdersFile": packed.pixels},
         str(table),
-        interpolation_error(table, texture),
+        interpolation_error(table, packed),
     )
 
 
@@ -232,8 +224,8 @@ def _patch(described: Surface, placed: Mapping[str, Any]) -> OslShader:
         "DrawsFile": textures.draws,
     }
     if (energy := energy_texture(described)) is not None:
-        constants |= energy.constants
-        files["EnergyFile"] = energy.pixels
+        files["EnergyFile"], scales = energy
+        constants |= scales
     constants["PIGMENT_SHARE"] = mean_transmittance(index, described.coat)
     return OslShader(
         "patch.osl",

@@ -55,23 +55,16 @@ class PatchTextures(NamedTuple):
     likelihood: float
 
 
-class EnergyTexture(NamedTuple):
-    """Scales of energy over directions.
+def energy_texture(
+    described: Surface,
+) -> tuple[NDArray[np.float32], dict[str, float | int]] | None:
+    """Tabulate the scales of energy; None where all are 1.
 
-    Attributes
-    ----------
-    pixels : (wavelengths · (polar + 1), azimuthal + 1, 4) float32 on `FINE`, the first column
-        repeated at the end; channels are the scales of the surface's height scale and of the
-        largest of its table, and two of 1. Wavelengths lie evenly in their logarithm.
-    constants : of `shaders/patch.osl`.
+    Returns pixels (wavelengths · (polar + 1), azimuthal + 1, 4) on `FINE`, the first column
+    repeated at the end, and constants of `shaders/patch.osl`. Channels are the scales of the
+    surface's height scale and of the largest of its table, and two of 1. Wavelengths lie evenly in
+    their logarithm.
     """
-
-    pixels: NDArray[np.float32]
-    constants: dict[str, float | int]
-
-
-def energy_texture(described: Surface) -> EnergyTexture | None:
-    """Tabulate the scales of energy at two height scales; None where all are 1."""
     nodes = described.height_scale.number, float(described.patch.height_scale_max)
     tables = [described.energy_scale(node) for node in nodes]
     if not (known := [table for table in tables if table is not None]):
@@ -82,7 +75,7 @@ def energy_texture(described: Surface) -> EnergyTexture | None:
         if table is not None:
             pages = np.stack([table.page(float(wavelength)) for wavelength in lam])
             values[..., channel] = np.pad(pages, [(0, 0), (0, 0), (0, 1)], mode="wrap")
-    constants = {
+    constants: dict[str, float | int] = {
         "ENERGY_POLAR": FINE.polar,
         "ENERGY_AZIMUTHAL": FINE.azimuthal,
         "ENERGY_SHARE": SHARE,
@@ -92,7 +85,7 @@ def energy_texture(described: Surface) -> EnergyTexture | None:
         "ENERGY_FIRST": float(np.log(lam[0])),
         "ENERGY_LAST": float(np.log(lam[-1])),
     }
-    return EnergyTexture(values.reshape(-1, *values.shape[2:]), constants)
+    return values.reshape(-1, *values.shape[2:]), constants
 
 
 def mean_transmittance(

@@ -6,15 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-#: Blender's socket class of each kind of socket, and the type in OSL.
-_KINDS = {
-    "float": ("NodeSocketFloat", "float"),
-    "color": ("NodeSocketColor", "color"),
-    "vector": ("NodeSocketVector", "vector"),
-    "normal": ("NodeSocketVector", "normal"),
-    "string": ("NodeSocketString", "string"),
-}
-
 
 @dataclass(frozen=True)
 class Socket:
@@ -24,7 +15,7 @@ class Socket:
     ----------
     identifier : name of the parameter in OSL.
     label : name that Blender shows, with the unit.
-    kind : "float", "color", "vector", "normal" or "string".
+    kind : type in OSL, "float", "color", "vector", "normal" or "string".
     default : value, or for vectors the global variable of OSL; colours have three numbers.
     help : tooltip.
     """
@@ -46,7 +37,7 @@ class Socket:
             value = f"{float(value)!r}"
         widget = ' string widget = "null",' if self.kind in ("vector", "normal") else ""
         return (
-            f"{_KINDS[self.kind][1]} {self.identifier} = {value}\n"
+            f"{self.kind} {self.identifier} = {value}\n"
             f'        [[{widget} string label = "{self.label}", string help = "{self.help}" ]]'
         )
 
@@ -55,23 +46,17 @@ class Socket:
 
         Vectors have no default: the shader takes the surface's own while nothing is linked.
         """
-        document = {**asdict(self), "socket": _KINDS[self.kind][0]}
-        if self.kind in ("vector", "normal"):
-            document["default"] = None
-        return document
+        unlinked = {"default": None} if self.kind in ("vector", "normal") else {}
+        return {**asdict(self), **unlinked}
 
 
 def array_parameter(kind: str, name: str, rows: Iterable[Any]) -> str:
     """Return the declaration of a parameter that is a constant array, which Blender hides.
 
-    kind : "float", "int" or "color"; rows of the latter have three numbers.
+    kind : "float" or "color"; rows of the latter have three numbers.
     """
-
-    def number(value: Any) -> str:
-        return str(int(value)) if kind == "int" else f"{float(value):.7g}"
-
     items = [
-        f"color({', '.join(number(x) for x in row)})" if kind == "color" else number(row)
+        f"color({', '.join(f'{x:.7g}' for x in row)})" if kind == "color" else f"{row:.7g}"
         for row in rows
     ]
     return f"{kind} {name}[{len(items)}] = {{{', '.join(items)}}}"

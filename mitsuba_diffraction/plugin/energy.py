@@ -8,7 +8,7 @@ albedo a reaches a nested BSDF.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -23,7 +23,7 @@ from ..optics import fresnel
 from ..optics.coat import coated_reflectance, cosine_within
 from ..optics.geometry import horizon_attenuation
 from ..optics.stack import Stacked
-from ..progress import show
+from ..progress import show, tracked
 from ..tables import DiffractionTable
 from ..tables.directional import FINE, DirectionalTable
 from ..tables.energy import conserved
@@ -47,6 +47,8 @@ NEAR, FINE_SHARE = 4.0, 0.02
 #: Largest change of a film's fringe by rounding its index, rad: at grazing angles light that a film
 #: guides gains several times, within narrow fringes.
 FILM_PHASE = 0.02
+
+_SCALES = "scales of energy"  # in progress
 
 #: Material of a surface, or materials of even thicknesses of a film, from the factor on its lengths
 #: (`ScaleRange.centre`) and wavelengths, nm.
@@ -135,10 +137,10 @@ class EnergyModel:
         """Return nodes, of height scales or thicknesses, nm, and a function's tables at them."""
         if self._thickness is None:
             nodes = self._factors.nodes(self._energies[0])
-            energies = _counted([self._at_node(node) for node in nodes])
+            energies = tracked([self._at_node(node) for node in nodes], show, _SCALES)
             found = zip(energies, nodes, strict=True)
             return nodes, scales_of([sides_of(each, each.at(node)) for each, node in found])
-        height, energies = self._factors.height_scale, _counted(self._energies)
+        height, energies = self._factors.height_scale, tracked(self._energies, show, _SCALES)
         thicknesses = np.linspace(*self._thickness.tabulated, len(self._energies)).tolist()
         return thicknesses, scales_of([_at_height(each, sides_of, height) for each in energies])
 
@@ -197,13 +199,6 @@ class EnergyModel:
         if sides is None:
             return None
         return DirectionalTable(sides[0].wavelengths * centre, sides[0].values)
-
-
-def _counted(parts: Sequence[Any]) -> Iterator[Any]:
-    """Yield parts of the work while their number is shown: each takes up to seconds."""
-    for number, part in enumerate(parts):
-        show(number, len(parts), "scales of energy")
-        yield part
 
 
 def _at_height(

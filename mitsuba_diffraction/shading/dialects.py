@@ -56,9 +56,13 @@ OSL = Dialect(
     functions={},
     reserved=frozenset(
         (
-            f"{_FUNCTIONS} P N I Ng dPdu dPdv u v time dtime color point vector normal "
-            "matrix string closure output public shader surface displacement volume emit "
-            "illuminance illuminate private inline noise cellnoise hashnoise snoise texture "
+            # the grammar's words, in use and kept for later (language specification, section 2)
+            f"{_FUNCTIONS} and or not case catch char class color closure default delete double "
+            "emit enum extern friend goto illuminance illuminate inline light long matrix new "
+            "normal operator output point private protected public shader short signed sizeof "
+            "static string super surface displacement switch template this throw try typedef "
+            "uniform union unsigned varying vector virtual volatile volume "
+            "P N I Ng dPdu dPdv u v time dtime noise cellnoise hashnoise snoise texture "
             "environment trace hypot print printf format area degrees radians transform "
             "rotate luminance blackbody wavelength_color raytype backfacing emission "
             "diffuse reflection transparent background"

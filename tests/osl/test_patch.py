@@ -127,14 +127,13 @@ def test_a_picture_of_one_colour_almost_everywhere_is_refused(tmp_path, some_var
 def test_scales_of_energy_are_those_of_the_description(theta, phi, height_scale, wavelength):
     """The look-up of shaders/patch.osl, at the nodes of its height scales and between them."""
     pages = [scale_of(scale).at(theta, phi, wavelength) for scale in (1.0, 1.5)]
-    energy = energy_texture(ENERGETIC)
-    constants = energy.constants
+    pixels, constants = energy_texture(ENERGETIC)
     row = (1 - np.sqrt(max(1 - 2 / np.pi * theta, 0))) / constants["ENERGY_SHARE"]
     row = min(row, 1.0) * constants["ENERGY_POLAR"]
     column = phi / (2 * np.pi) % 1.0 * constants["ENERGY_AZIMUTHAL"]
     first, last = constants["ENERGY_FIRST"], constants["ENERGY_LAST"]
     page = (np.log(wavelength) - first) / (last - first) * (constants["ENERGY_PAGES"] - 1)
-    pixels = energy.pixels.reshape(constants["ENERGY_PAGES"], -1, *energy.pixels.shape[1:])
+    pixels = pixels.reshape(constants["ENERGY_PAGES"], -1, *pixels.shape[1:])
     place = [[page], [row], [column]]
     nodes = [map_coordinates(pixels[..., n], place, order=1)[0] for n in (0, 1)]
     heights = [0.0, constants["ENERGY_HEIGHT"], constants["ENERGY_MOST"]]

@@ -2,71 +2,24 @@
 
 from __future__ import annotations
 
-import functools
 import json
 
 import mitsuba as mi
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, OrderTable
-from mitsuba_diffraction.orders import cells
-from mitsuba_diffraction.osl.solved import interpolation_error, order_constants, order_texture
+from mitsuba_diffraction.osl.solved import MOST_BYTES, interpolation_error
 from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
+from mitsuba_diffraction.shading.orders import pack_orders
 from tests.support.orders import thin_grating
 
 TABLE = thin_grating()
-TEXTURE = order_texture(TABLE)
-
-
-@functools.cache
-def constants():
-    """Constants of the shader, whose error takes seconds to measure."""
-    return order_constants(TABLE, TEXTURE)
-
-
-def looked_up(x, y, wavelength, order):
-    """Efficiency by the steps of shaders/orders.osl."""
-    cell = cells.to_cell(x, y, wavelength, TABLE.optical_period)
-    w = cells.w_of(cell.k_continuous, wavelength, TABLE.wavelengths, TABLE.optical_period)
-    band, kind, j = int(cell.band), int(cell.kind), int(cell.channel)
-    q = j - order
-    if not 0 <= q < band + 1 - kind:
-        return 0.0
-    packs = (band + 1 - kind + 3) // 4
-    first = TEXTURE.starts[2 * band + kind] + j * packs + q // 4
-    size = constants()
-    tau, rho = float(cell.tau) * size["TAU"], float(cell.rho) * size["RHO"]
-    place = float(w) * size["W"]
-    slices = [min(int(place), size["W"]), min(int(place) + 1, size["W"])]
-    values = [pixel(first * (size["W"] + 1) + n, tau, rho)[q % 4] for n in slices]
-    return np.interp(place - int(place), [0, 1], values)
-
-
-def pixel(tile, tau, rho):
-    across, width, height = TEXTURE.tiles_across, constants()["TAU"] + 1, constants()["RHO"] + 1
-    row, column = tile // across * height, tile % across * width
-    a, b = min(int(tau), width - 2), min(int(rho), height - 2)
-    four = TEXTURE.pixels[row + b : row + b + 2, column + a : column + a + 2].astype(float)
-    weights = np.outer([1 - rho + b, rho - b], [1 - tau + a, tau - a])
-    return np.einsum("ba,bac->c", weights, four)
-
-
-@settings(deadline=None, max_examples=60)
-@given(st.floats(0.0, 0.99), st.floats(0.0, 2 * np.pi), st.floats(380.0, 780.0), st.integers(-6, 6))
-def test_texture_has_the_efficiencies_of_the_table(sine, phi, wavelength, order):
-    x, y = sine * np.cos(phi), sine * np.sin(phi)
-    exact = TABLE.efficiency(x, y, wavelength, order)
-    # cells of the texture: 1/16 of a kind along τ, so that curves of the thin grating, whose
-    # efficiencies vary by up to 1 across a kind, are off by (1/16)²/8 times their curvature
-    assert looked_up(x, y, wavelength, order) == pytest.approx(exact, abs=0.01)
 
 
 def test_error_of_the_textures_is_measured():
-    mean, worst = interpolation_error(TABLE, TEXTURE).values()
+    mean, worst = interpolation_error(TABLE, pack_orders(TABLE, MOST_BYTES)).values()
     assert 0.0 < mean < worst < 0.01
 
 
@@ -104,7 +57,7 @@ def test_folder_is_no_part_of_what_is_written(tmp_path, some_variant):
 
 
 @pytest.mark.parametrize(
-    "name", ["", "1cd", "a b", "../cd", "if", "while", "md_lobe", "PERIOD", "mix", "Starts"]
+    "name", ["", "1cd", "a b", "../cd", "if", "while", "md_lobe", "PERIOD", "mix", "Wavelengths"]
 )
 def test_name_must_be_that_of_a_shader(tmp_path, some_variant, name):
     with pytest.raises(DiffractionError, match="name="):

@@ -17,13 +17,26 @@ SIZE = (96, 64)
 #: Milliseconds that a page may take for anything: shaders are compiled in software, on a machine
 #: that may be busy.
 PATIENCE = 600_000
-#: As soon as there is a viewer, it draws no more than a test asks for, and waits as long as tests
-#: do. In a frame of a page scripts like this one may come after the page's own.
+#: As soon as there is a viewer, it draws no more than a test asks for, and a test can wait for it.
+#: In a frame of a page scripts like this one may come after the page's own.
 ONE_SAMPLE = f"""{{
     const prepare = (viewer) => {{
-        const own = viewer.settled;
         viewer.most = 1;
-        viewer.settled = (count) => own.call(viewer, count, {PATIENCE});
+        // wait until a still picture has so many samples
+        viewer.settled = (count = viewer.enough) => {{
+            const end = Date.now() + {PATIENCE};
+            viewer.wake();
+            return new Promise((resolve, reject) => {{
+                const look = () => {{
+                    const {{ moving, dirty, latest }} = viewer;
+                    if (!moving && !dirty && latest?.moving === false && viewer.count >= count)
+                        resolve();
+                    else if (Date.now() > end) reject(new Error(`there are no ${{count}} samples`));
+                    else setTimeout(look, 5);
+                }};
+                look();
+            }});
+        }};
     }};
     if (window.viewer) prepare(window.viewer);
     else Object.defineProperty(window, "viewer", {{ configurable: true, set(viewer) {{

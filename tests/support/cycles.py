@@ -23,7 +23,8 @@ for degrees in tilts:
     tree = material.node_tree
     for item in document["inputs"]:
         name = item["identifier"]
-        socket = script.inputs.new(item["socket"], item["label"], identifier=name)
+        kind = "Vector" if item["kind"] == "normal" else item["kind"].capitalize()
+        socket = script.inputs.new(f"NodeSocket{{kind}}", item["label"], identifier=name)
         value = values.get(name, item["default"])
         if name in document["textures"]:
             value = str(folder / document["textures"][name])

@@ -17,10 +17,13 @@ _READ = """async ([shadows, samples]) => {
     viewer.shadows = shadows;
     viewer.touch();
     await viewer.settled(samples);
+    const { gl, sums, width, height } = viewer.drawing, sum = new Float32Array(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, sums[0].frame);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, sum);
+    const mean = sum.map((x) => x / viewer.count);
     let text = "";
-    for (const byte of new Uint8Array(viewer.drawing.read(viewer.count).buffer))
-        text += String.fromCharCode(byte);
-    return [btoa(text), viewer.drawing.width, viewer.drawing.height];
+    for (const byte of new Uint8Array(mean.buffer)) text += String.fromCharCode(byte);
+    return [btoa(text), width, height];
 }"""
 
 

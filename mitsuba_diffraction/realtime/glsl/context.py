@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...extras import optional
 from .scene import VERTEX
-from .source import fragment_parts, plain_source, vertex_source
+from .source import joined, source_parts
 from .texels import PAGE, Packed, Texture, Uniform, distinct_rows
 
 #: Required version of OpenGL, 3.3.
 REQUIRED = 330
+
+Owned = TypeVar("Owned")
 
 _INSTALL = "apt install libegl1 libgl1 libgl1-mesa-dri"
 
@@ -66,30 +68,40 @@ def check_version(context: Any) -> None:
 
 
 def compile_program(
-    context: Any,
-    method: str,
-    definitions: Mapping[str, str],
+    context: Any, name: str, parts: Sequence[tuple[str, str]], vertex: str = "surface.vert"
 ) -> Any:
-    """Compile the program of a method.
+    """Compile a program.
+
+    name : of the program in messages.
+    parts : names and texts of the fragment stage; vertex : file of the vertex stage.
 
     Raises a DiffractionError with file, line and the driver's message if it does not compile.
     """
     moderngl = optional("moderngl")
-    stage = vertex_source()
-    parts = fragment_parts(method, definitions)
+    stage = source_parts([vertex])
     try:
-        return context.program(
-            vertex_shader=stage, fragment_shader="".join(text for _, text in parts)
-        )
+        return context.program(vertex_shader=joined(stage), fragment_shader=joined(parts))
     except moderngl.Error as error:
         log = str(error)
-        if "vertex_shader" in log:
-            parts = [("surface.vert", stage)]
-        words = compiler_words(log, parts)
-        raise DiffractionError(f"the driver cannot compile method {method}: {words}") from None
+        words = compiler_words(log, stage if "vertex_shader" in log else parts)
+        raise DiffractionError(f"the driver cannot compile {name}: {words}") from None
 
 
-class VertexBuffer:
+class Resources:
+    """Owner of resources of OpenGL, which are freed together."""
+
+    def own(self, resource: Owned) -> Owned:
+        """Add a resource that `release` frees, and return it."""
+        self.__dict__.setdefault("_owned", []).append(resource)
+        return resource
+
+    def release(self) -> None:
+        """Free the graphics card's memory."""
+        for resource in reversed(self.__dict__.pop("_owned", [])):
+            resource.release()
+
+
+class VertexBuffer(Resources):
     """Uploaded triangles. A vertex that several share is uploaded, and transformed, once.
 
     vertices : (n, 17), attributes as in `scene.VERTEX`; three consecutive ones are a triangle.
@@ -98,8 +110,8 @@ class VertexBuffer:
     def __init__(self, context: Any, vertices: NDArray[np.float32]) -> None:
         self._context = context
         distinct, corners = distinct_rows(vertices)
-        self._vertices = context.buffer(distinct.tobytes())
-        self._corners = context.buffer(corners.tobytes())
+        self._vertices = self.own(context.buffer(distinct.tobytes()))
+        self._corners = self.own(context.buffer(corners.tobytes()))
 
     def array(self, program: Any) -> Any:
         """Return the vertex array of the attributes that a program reads."""
@@ -107,10 +119,6 @@ class VertexBuffer:
         layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in VERTEX)
         attributes = [(self._vertices, layout, *names)]
         return self._context.vertex_array(program, attributes, index_buffer=self._corners)
-
-    def release(self) -> None:
-        self._vertices.release()
-        self._corners.release()
 
 
 def enable_sides(context: Any, winding: int) -> None:
@@ -120,23 +128,6 @@ def enable_sides(context: Any, winding: int) -> None:
     """
     context.cull_face = "back" if winding > 0 else "front"
     context.enable_only(context.DEPTH_TEST | (context.CULL_FACE if winding else context.NOTHING))
-
-
-def compile_plain(
-    context: Any,
-    vertex: str,
-    fragment: str,
-    shared: Sequence[str] = (),
-    definitions: Mapping[str, str] | None = None,
-) -> Any:
-    """Compile a program of two files that depend on neither surfaces nor tables.
-
-    shared, definitions : parameters of `source.plain_source` for the fragment stage.
-    """
-    return context.program(
-        vertex_shader=plain_source(vertex),
-        fragment_shader=plain_source(fragment, shared, definitions),
-    )
 
 
 def compiler_words(log: str, parts: Sequence[tuple[str, str]]) -> str:
@@ -178,7 +169,7 @@ def upload(context: Any, texture: Texture) -> Any:
     return uploaded
 
 
-class Target:
+class Target(Resources):
     """Framebuffer in single precision, with depth.
 
     Raises a DiffractionError if it is larger than the driver's textures.
@@ -191,50 +182,40 @@ class Target:
                 f"a picture of {width} × {height} samples is too large for the driver, which "
                 f"supports {largest}; lower the supersampling or the size"
             )
-        self.colour = context.texture((width, height), 4, dtype="f4")
-        self.depth = context.depth_renderbuffer((width, height))
-        self.frame = context.framebuffer([self.colour], self.depth)
+        self.colour = self.own(context.texture((width, height), 4, dtype="f4"))
+        depth = self.own(context.depth_renderbuffer((width, height)))
+        self.frame = self.own(context.framebuffer([self.colour], depth))
 
     def read(self) -> NDArray[np.float32]:
         """Return the picture (height, width, 4), from the top row down."""
         pixels = np.frombuffer(self.frame.read(components=4, dtype="f4"), np.float32)
         return pixels.reshape(self.frame.height, self.frame.width, 4)[::-1]
 
-    def release(self) -> None:
-        for thing in (self.frame, self.colour, self.depth):
-            thing.release()
 
-
-class Bindings:
+class Bindings(Resources):
     """Uploaded textures and uniforms, for any program that reads them."""
 
     def __init__(self, context: Any, parts: Packed) -> None:
         self.uniforms = dict(parts.uniforms)
         self.definitions = dict(parts.definitions)
-        self.textures = {texture.name: upload(context, texture) for texture in parts.textures}
+        self.textures = {t.name: self.own(upload(context, t)) for t in parts.textures}
 
     def use(self, program: Any, first_unit: int = 0) -> int:
         """Bind textures and uniforms in a program, and return the next free texture unit."""
         return bind(program, self.uniforms, self.textures, first_unit)
 
-    def release(self) -> None:
-        for texture in self.textures.values():
-            texture.release()
 
-
-class ShaderPass:
+class ShaderPass(Resources):
     """Program of a triangle that covers the picture.
 
-    fragment, shared, definitions : parameters of `source.plain_source` for the fragment stage.
+    files, definitions : of `source.source_parts` for the fragment stage.
     """
 
-    def __init__(
-        self, context: Any, fragment: str, shared: Sequence[str] = (),
-        definitions: Mapping[str, str] | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, context: Any, *files: str, **definitions: str) -> None:
         self._context = context
-        self._program = compile_plain(context, "whole.vert", fragment, shared, definitions)
-        self._triangle = context.vertex_array(self._program, [])
+        parts = source_parts(files, definitions)
+        self._program = self.own(compile_program(context, files[-1], parts, "whole.vert"))
+        self._triangle = self.own(context.vertex_array(self._program, []))
 
     def draw(
         self, uniforms: Mapping[str, Uniform], textures: Mapping[str, Any], *, adding: bool = False
@@ -246,10 +227,6 @@ class ShaderPass:
         bind(self._program, uniforms, textures)
         self._triangle.render(vertices=3)
         context.enable_only(context.NOTHING)
-
-    def release(self) -> None:
-        self._triangle.release()
-        self._program.release()
 
 
 def bind(

@@ -134,11 +134,8 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     surface = packed_by(described)
     material = ShaderMaterial(Map(np.zeros(3)), surface)
     common = pack_surface(material) | pack_conservation(material)
-    common |= Packed(
-        uniforms={"height_scale": described.height_scale.number},
-        definitions={"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1)},
-    )
-    common |= Packed(definitions={"SURFACE_KIND": "0", **common.definitions})
+    constants = {"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "SURFACE_KIND": "0"}
+    common |= Packed(definitions={**constants, **common.definitions})
     tables = {method: method_tables(method, surface) for method in methods}
     if "exact" in tables:
         tables["exact"] |= pack_responses([(np.array([360.0, 830.0]), np.ones(2))])

@@ -14,7 +14,8 @@ from .maps import uploaded
 from .packing import daylight_colour
 
 _SAMPLES = 1024  # samples of a light with an extent
-_SUN_COSINE = float(np.cos(np.radians(0.6)))  # the sun's disc has a radius of 0.27°
+#: Radius around the sun, rad, whose light is the sun's: its disc has 0.27°.
+AROUND_SUN = np.radians(0.6)
 
 
 @dataclass(frozen=True)
@@ -153,7 +154,7 @@ def _mean_sample(
     """
     values, directions, distances, wavelengths = sampled_directions(emitter, point, samples)
     if sun is not None:
-        values = (values.T * (directions @ sun > _SUN_COSINE)).T
+        values = (values.T * (directions @ sun > np.cos(AROUND_SUN))).T
     weight = values.reshape(samples, -1).sum(axis=1)
     total = weight.sum()
     share = weight / total if total > 0.0 else np.full(len(weight), 1.0 / len(weight))
@@ -170,7 +171,7 @@ def _sky(emitter: Any, point: Real, sun: Real | None = None) -> Real:
     half, which has no further even orders; odd orders beyond 1 do not contribute.
     """
     values, directions, _, wavelengths = sampled_directions(emitter, point, _SAMPLES)
-    included = np.ones(len(values)) if sun is None else directions @ sun <= _SUN_COSINE
+    included = np.ones(len(values)) if sun is None else directions @ sun <= np.cos(AROUND_SUN)
     factors = np.column_stack(
         [included / (4.0 * np.pi), included[:, None] * directions / (2.0 * np.pi)]
     )

@@ -13,6 +13,7 @@ from ...optics.boundary import MODELS
 from ...optics.colour import RGB_WAVELENGTHS, response
 from ...optics.geometry import wavenumber
 from ...plugin.description import Feature, Surface
+from ...progress import show, tracked
 from ...tables.colour.table import cached_colours
 from ...tables.directional import DirectionalTable
 from .lobes import colour_power, pack_lobes
@@ -46,10 +47,17 @@ class Modelled:
             f"height scale {described.height_scale.number:g}"
         )
 
+    @property
+    def height_room(self) -> float:
+        """Largest factor on the height scale that the table serves."""
+        scale = self._coat * self.described.height_scale.number
+        return self.described.patch.height_scale_max / max(scale, 1e-9)
+
     def surface(self) -> Packed:
         """Pack constants and definitions that all methods share."""
         described = self.described
-        definitions, uniforms = {"DIFFRACTING": ""}, dict[str, Uniform]()
+        definitions = {"DIFFRACTING": ""}
+        uniforms: dict[str, Uniform] = {"height_scale": described.height_scale.number}
         if described.shadowing:
             definitions["VCAVITY"] = ""
         if described.coat is not None:
@@ -63,9 +71,12 @@ class Modelled:
 
     def conservation(self, scales: Sequence[float]) -> Packed:
         """Pack energy conservation and the base's light, one page per height scale."""
-        excesses = [self.described.albedo_excess(scale) for scale in scales]
-        pages = [self.described.energy_scale(scale) for scale in scales]
-        return pack_directions(excesses, [None if s is None else luminous_mean(s) for s in pages])
+        excesses, pages = [], []
+        for scale in tracked(scales, show, "scales of energy"):
+            excesses.append(self.described.albedo_excess(scale))
+            page = self.described.energy_scale(scale)
+            pages.append(None if page is None else luminous_mean(page))
+        return pack_directions(excesses, pages)
 
     def tables(self, method: str) -> Packed:
         """Pack the table for `fast` or `exact`."""

@@ -44,14 +44,15 @@ class PackedScene:
     ----------
     scene : a `mi.Scene` of the current variant, or an XML file.
     sensor : index of the camera.
-    heights : factors on the height scales for which energy scales are packed, one page each.
+    octaves : log2 of factors on the height scales for which energy scales are packed, a page each.
 
     Attributes
     ----------
     diffracting : one surface of each table.
+    octaves : those of the parameter whose heights all tables serve.
     """
 
-    def __init__(self, scene: Any, sensor: int = 0, heights: Sequence[float] = (1.0,)) -> None:
+    def __init__(self, scene: Any, sensor: int = 0, octaves: Sequence[float] = (0.0,)) -> None:
         self.mitsuba_scene = load(scene)
         self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
         tables: dict[int, Diffracting] = {}
@@ -59,6 +60,9 @@ class PackedScene:
             tables.setdefault(id(surface.described.table), surface)
         self.diffracting = tuple(tables.values())
         numbers = {key: number for number, key in enumerate(tables)}
+        room = min(surface.height_room for surface in self.scene.diffracting)
+        self.octaves = tuple(n for n in octaves if 2.0**n <= max(room, 1.0))
+        heights = [2.0**n for n in self.octaves]
         self.surfaces = tuple(
             PackedSurface(
                 surface,
@@ -100,31 +104,26 @@ class PackedScene:
 
     @cached_property
     def around(self) -> Packed:
-        """Environment, and flat shapes with their light, for shaders/surroundings.glsl."""
+        """All that lobes look up, for shaders/surroundings.glsl and shaders/obstacles.glsl.
+
+        An environment, flat shapes with their light, and distances to all other shapes without.
+        """
         assert self.emitters is not None
+        flats = flat_shapes(self.mitsuba_scene)
         extent = float(np.ptp([self.scene.low, self.scene.high]))
-        packed = pack_flats(self._flats, self.emitters.share_of)
+        packed = pack_flats(flats, self.emitters.share_of)
         packed |= Packed((), {"least_distance": 1e-6 * extent})
         if (environment := self.emitters.environment) is not None:
             packed |= environment.packed(self.emitters.share_of(environment.emitter))
-        return packed
-
-    @cached_property
-    def obstacles(self) -> Packed:
-        """Distances to all other shapes that obstruct directions, for shaders/obstacles.glsl."""
-        flat = {shape.ptr for shape in self._flats}
+        flat = {shape.ptr for shape in flats}
         solid: list[NDArray[np.float32]] = [
             surface.vertices[:, :3].reshape(-1, 3, 3)
             for surface in self.scene.surfaces
             if surface.shape.ptr not in flat and surface.radiance is None
         ]
-        return pack_obstacles(np.concatenate(solid)) if solid else Packed()
+        return packed | pack_obstacles(np.concatenate(solid)) if solid else packed
 
     @cached_property
     def bounces(self) -> Packed:
         """Light between surfaces, for shaders/bounces.glsl; takes seconds to trace."""
         return pack_bounces(self.mitsuba_scene, self.scene)
-
-    @cached_property
-    def _flats(self) -> list[Any]:
-        return flat_shapes(self.mitsuba_scene)

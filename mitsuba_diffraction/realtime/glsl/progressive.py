@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...arrays import Real
 from ...errors import DiffractionError
 from .camera import Camera
-from .context import Bindings, ShaderPass, Target, VertexBuffer
+from .context import Bindings, Resources, ShaderPass, Target, VertexBuffer
 from .emitters import NO_LIGHT
 from .lights import Lamp
 from .packed_scene import PackedScene
@@ -37,7 +37,7 @@ _STEPS = np.append(np.sqrt([2.0, 3.0, 7.0, 11.0, 13.0, 17.0]), [0.5 + 1.25**0.5,
 _WHITE = Lamp("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
 
 
-class Stage:
+class Stage(Resources):
     """Emitters, surroundings and shadow casters of a scene, uploaded; independent of the camera.
 
     Raises a DiffractionError if no emitter lights the scene, or the environment is not finite.
@@ -46,37 +46,24 @@ class Stage:
     def __init__(self, context: Any, packed: PackedScene, buffers: list[VertexBuffer]) -> None:
         self.context, self._packed = context, packed
         self._bounces: Bindings | None = None
-        self._resources: list[Any] = []
         if packed.emitters is None:
             raise DiffractionError(NO_LIGHT)
         self.emitters = packed.emitters
-        self.casters = self._register(Casters(context, packed.scene, buffers))
-        self._around = self._bound(packed.around)
-        self._obstacles = self._bound(packed.obstacles)
-        self._lobes = [self._bound(lobes) for lobes in packed.lobes]
+        self.casters = self.own(Casters(context, packed.scene, buffers))
+        self._around = self.own(Bindings(context, packed.around))
+        self._lobes = [self.own(Bindings(context, lobes)) for lobes in packed.lobes]
         self._background: ShaderPass | None = None
         if self.emitters.environment is not None:
-            shared = ("library.glsl", "surroundings.glsl")
-            self._background = self._register(
-                ShaderPass(context, "background.frag", shared, self._around.definitions)
-            )
+            files = ("library.glsl", "surroundings.glsl", "background.frag")
+            self._background = self.own(ShaderPass(context, *files, **self._around.definitions))
         self.looks_up = packed.looks_up
-
-    def _register(self, resource: Any) -> Any:
-        """Add a resource that `release` frees, and return it."""
-        self._resources.append(resource)
-        return resource
-
-    def _bound(self, packed: Packed) -> Bindings:
-        """Upload packed data."""
-        bindings: Bindings = self._register(Bindings(self.context, packed))
-        return bindings
 
     def extras(self, bounces: bool) -> list[list[Bindings]]:
         """Return the bindings of each surface: surroundings, lobes, and light between surfaces."""
-        shared = [self._around, self._obstacles]
+        shared = [self._around]
         if bounces:
-            self._bounces = self._bounces or self._bound(self._packed.bounces)
+            if self._bounces is None:
+                self._bounces = self.own(Bindings(self.context, self._packed.bounces))
             shared.append(self._bounces)
         return [
             shared + ([] if surface.table is None else [self._lobes[surface.table]])
@@ -98,12 +85,8 @@ class Stage:
             }
             self._background.draw(uniforms, self._around.textures)
 
-    def release(self) -> None:
-        for resource in reversed(self._resources):
-            resource.release()
 
-
-class ProgressiveLight:
+class ProgressiveLight(Resources):
     """Picture that accumulates frames, created by `Renderer.progressive`.
 
     draw : `Renderer.draw_lights` of a method.
@@ -122,14 +105,12 @@ class ProgressiveLight:
         self._looks_up = (stage.looks_up or bounces) and not lights
         self._surroundings = stage.extras(bounces)
         context = stage.context
-        self._map = ShadowMap(stage.casters, shadow_size)
-        self._frame = Target(context, *camera.size)
-        self._sums = [Target(context, *camera.size) for _ in range(2)]  # one per kind of frame
-        self._counts = [0, 0]
-        self._lights: Iterator[Lamp] = iter(())
+        self._map = self.own(ShadowMap(stage.casters, shadow_size))
+        # a frame, and the sum of each kind of frames
+        self._frame, *self._sums = (self.own(Target(context, *camera.size)) for _ in range(3))
         self._visible = stage.casters.visible(camera)
         self.restart()
-        self._add = ShaderPass(context, "add.frag")
+        self._add = self.own(ShaderPass(context, "add.frag"))
 
     @property
     def frames(self) -> int:
@@ -143,7 +124,9 @@ class ProgressiveLight:
         self._counts = [0, 0]
         self._drawn: Counter[tuple[str, bool]] = Counter()  # number of frames of each emitter
         emitters = self._stage.emitters
-        self._lights = itertools.cycle(self._fixed) if self._fixed else emitters.lights()
+        self._lights: Iterator[Lamp] = (
+            itertools.cycle(self._fixed) if self._fixed else emitters.lights()
+        )
 
     def advance(self, frames: int = 1) -> None:
         """Add this many frames."""
@@ -171,21 +154,22 @@ class ProgressiveLight:
         definitions = {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
             definitions["WEIGHTED"] = ""
-        textures = {"shadow_map": self._map.texture}
-        self._draw(
-            self._frame.frame, camera, [light], definitions, uniforms, self._surroundings,
-            textures, self._visible.windings,
-        )  # fmt: skip
+        self._draw_part(
+            light, camera, Packed((), uniforms, definitions), shadow_map=self._map.texture
+        )
 
     def _look_up(self, camera: Camera, numbers: Real) -> None:
         """Draw the surroundings that each pixel's lobes look up."""
-        uniforms: dict[str, Uniform] = {
-            "sequence": tuple(numbers.tolist()), "surroundings_lit": (1.0, 1.0),
-        }  # fmt: skip
+        uniforms = {"sequence": tuple(numbers.tolist()), "surroundings_lit": (1.0, 1.0)}
+        self._draw_part(_WHITE, camera, Packed((), uniforms, {"LOOKED_UP": ""}))
+
+    def _draw_part(self, light: Lamp, camera: Camera, packed: Packed, **textures: Any) -> None:
+        """Draw one kind of a frame."""
+        bindings = Bindings(self._stage.context, packed)
+        bindings.textures |= textures
         self._draw(
-            self._frame.frame, camera, [_WHITE], {"LOOKED_UP": ""}, uniforms, self._surroundings,
-            {}, self._visible.windings,
-        )  # fmt: skip
+            self._frame.frame, camera, [light], bindings, self._surroundings, self._visible.windings
+        )
 
     @property
     def image(self) -> NDArray[np.float32]:
@@ -194,8 +178,3 @@ class ProgressiveLight:
         total = np.sum([target.read() / np.float32(max(count, 1)) for target, count in sums], 0)
         total[..., 3] /= np.float32(max(sum(count > 0 for count in self._counts), 1))
         return np.asarray(total, np.float32)
-
-    def release(self) -> None:
-        resources: list[Any] = [self._add, self._frame, *self._sums, self._map]
-        for resource in resources:
-            resource.release()

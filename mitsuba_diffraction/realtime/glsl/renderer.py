@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,9 @@ from ...system import cores
 from .camera import Camera
 from .context import (
     Bindings,
+    Resources,
     Target,
     VertexBuffer,
-    bind,
     check_version,
     compile_program,
     enable_sides,
@@ -30,14 +30,14 @@ from .packed_scene import PackedScene
 from .packing import pack_responses
 from .progressive import ProgressiveLight, Stage
 from .shadows import SIZE
-from .source import LIGHTS
+from .source import LIGHTS, fragment_parts
 from .texels import Packed, Uniform
 
 Image = NDArray[np.float32]
 _SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
 
 
-class Renderer:
+class Renderer(Resources):
     """Renderer of one Mitsuba scene by shaders.
 
     Supported are meshes, rectangles, spheres, disks and cylinders; diffraction and solved orders
@@ -64,11 +64,12 @@ class Renderer:
         self.camera = self.scene.camera
         self.lights: list[Lamp] = list(self.scene.lighting.lights)
         self.sky = self.scene.lighting.sky
-        self._own_context = context is None
-        self.context = headless_context() if context is None else context
+        self.context = self.own(headless_context()) if context is None else context
         check_version(self.context)
-        self.buffers = [VertexBuffer(self.context, s.vertices) for s in self.scene.surfaces]
-        self.bindings = [Bindings(self.context, s.packed) for s in self.packed.surfaces]
+        self.buffers = [
+            self.own(VertexBuffer(self.context, s.vertices)) for s in self.scene.surfaces
+        ]
+        self.bindings = [self.own(Bindings(self.context, s.packed)) for s in self.packed.surfaces]
         self._tables: dict[str, list[Bindings]] = {}
         self._programs: dict[object, Any] = {}
         self._arrays: dict[object, Any] = {}
@@ -141,12 +142,13 @@ class Renderer:
         definitions = {"LIGHTS_LIT": str(len(self.lights))}
         if np.any(self.sky != 0.0):
             definitions["SKY"] = ""
+        uniforms: dict[str, Uniform] = {
+            "sky": np.asarray(self.sky, np.float32), "surroundings_lit": (1.0, 1.0),
+        }  # fmt: skip
+        bindings = Bindings(self.context, Packed((), uniforms, definitions))
         frame.use()
         frame.clear(0.0, 0.0, 0.0, 0.0)
-        self.draw_lights(
-            method, frame, camera or self.camera, self.lights, definitions,
-            {"sky": np.asarray(self.sky, np.float32), "surroundings_lit": (1.0, 1.0)},
-        )  # fmt: skip
+        self.draw_lights(method, frame, camera or self.camera, self.lights, bindings)
 
     def progressive(
         self,
@@ -174,7 +176,7 @@ class Renderer:
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
-        self._stage = self._stage or Stage(self.context, self.packed, self.buffers)
+        self._stage = self._stage or self.own(Stage(self.context, self.packed, self.buffers))
         draw = functools.partial(self.draw_lights, method)
         return ProgressiveLight(
             self._stage, draw, resized, lights=lights, shadow_size=shadow_size, bounces=bounces
@@ -186,10 +188,8 @@ class Renderer:
         frame: Any,
         camera: Camera,
         lights: Sequence[Lamp],
-        definitions: dict[str, str],
-        uniforms: dict[str, Uniform],
+        bindings: Bindings,
         extras: Sequence[Sequence[Bindings]] = (),
-        textures: Mapping[str, Any] | None = None,
         windings: Sequence[int] = (),
     ) -> None:
         """Draw some lights, or looked-up surroundings, into a framebuffer.
@@ -198,7 +198,7 @@ class Renderer:
         ----------
         method, frame, camera : as in `draw`.
         lights : lights without extent.
-        definitions, uniforms, textures : definitions, uniforms and textures of the light.
+        bindings : of the light; they get the uniforms of the camera and of the lights.
         extras : further bindings of each surface.
         windings : of each surface whose triangles that face away are hidden; 0 for others.
         """
@@ -212,45 +212,30 @@ class Renderer:
             if place[3] == 0.0:
                 place[:3] /= np.linalg.norm(place[:3])
             places[n], colours[n] = place, light.colour
-        shared: dict[str, Uniform] = {
+        bindings.uniforms |= {
             "view_projection": tuple(matrix.T.ravel().tolist()),
             "eye": tuple(camera.eye.tolist()),
             "light_place": places,
             "light_colour": colours,
-            **uniforms,
         }
         for n, surface in enumerate(self.scene.surfaces):
-            further = extras[n] if extras else ()
-            parts = (self.bindings[n], tables[n], *further)
-            program, array = self._program(method, n, parts, definitions)
-            set_uniforms(program, shared)
+            parts = (bindings, self.bindings[n], tables[n], *(extras[n] if extras else ()))
+            program, array = self._program(method, n, parts)
             unit = 0
             for part in parts:
                 unit = part.use(program, unit)
-            unit = bind(program, {}, textures or {}, unit)
             self.use_responses(program, unit, lights)
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
-            if (diffraction := surface.material.diffraction) is not None:
-                height_scale = diffraction.described.height_scale.number
-                set_uniforms(program, {"height_scale": height_scale})
             enable_sides(self.context, windings[n] if windings else 0)
             array.render()
 
     def release(self) -> None:
         """Free the graphics card's memory."""
-        for held in (self._arrays, self._programs):
-            for thing in held.values():
-                thing.release()
-        for tables in self._tables.values():
-            for one in {id(table): table for table in tables}.values():
-                one.release()
-        for resource in (*self.bindings, *self.buffers, self._responses, self._stage):
-            if resource is not None:
-                resource.release()
-        if self._own_context:
-            self.context.release()
+        if self._responses is not None:
+            self._responses.release()
+        super().release()
 
     def tables(self, method: str) -> list[Bindings]:
         """Return a method's table of each surface, uploaded at the first call; empty without one.
@@ -259,29 +244,29 @@ class Renderer:
         """
         if method not in self._tables:
             tables = (*self.packed.tables(method), Packed())
-            bound = [Bindings(self.context, packed) for packed in tables]
+            bound = [self.own(Bindings(self.context, packed)) for packed in tables]
             numbers = (-1 if s.table is None else s.table for s in self.packed.surfaces)
             self._tables[method] = [bound[number] for number in numbers]
         return self._tables[method]
 
-    def _program(
-        self, method: str, number: int, parts: Sequence[Bindings], light: Mapping[str, str]
-    ) -> tuple[Any, Any]:
+    def _program(self, method: str, number: int, parts: Sequence[Bindings]) -> tuple[Any, Any]:
         """Return the program of a surface and its vertex array; both are cached.
 
-        parts : of the surface, its table and its surroundings.
-        light : definitions of the light.
+        parts : of the light, the surface, its table and its surroundings.
 
         Raises a DiffractionError if the program does not compile.
         """
-        definitions = dict(light)
+        definitions = dict[str, str]()
         for part in parts:
             definitions |= part.definitions
         key = method, frozenset(definitions.items())
         if key not in self._programs:
-            self._programs[key] = compile_program(self.context, method, definitions)
+            parts_of_stage = fragment_parts(method, definitions)
+            program = compile_program(self.context, f"method {method}", parts_of_stage)
+            self._programs[key] = self.own(program)
         if (number, key) not in self._arrays:
-            self._arrays[number, key] = self.buffers[number].array(self._programs[key])
+            array = self.buffers[number].array(self._programs[key])
+            self._arrays[number, key] = self.own(array)
         return self._programs[key], self._arrays[number, key]
 
     def use_responses(self, program: Any, unit: int, lights: Sequence[Lamp] | None = None) -> None:

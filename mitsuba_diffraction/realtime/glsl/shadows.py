@@ -19,9 +19,10 @@ import scipy
 
 from ...arrays import Real
 from .camera import Camera, box_corners
-from .context import Target, VertexBuffer, compile_plain, enable_sides, set_uniforms
+from .context import Resources, Target, VertexBuffer, compile_program, enable_sides, set_uniforms
 from .lights import Lamp
 from .scene import RealtimeScene
+from .source import source_parts
 from .texels import Uniform
 
 _GLANCES = 192  # pixels along the longer side of the picture that determines the visible part
@@ -65,7 +66,7 @@ class Solid:
         return 0 if place[3] and inside.all() else self.winding
 
 
-class Casters:
+class Casters(Resources):
     """Triangles of a scene that cast shadows, drawn by their positions alone.
 
     buffers : vertex buffers of the surfaces.
@@ -73,8 +74,9 @@ class Casters:
 
     def __init__(self, context: Any, scene: RealtimeScene, buffers: Sequence[VertexBuffer]) -> None:
         self.context, self._surfaces = context, scene.surfaces
-        self.program = compile_plain(context, "surface.vert", "position.frag")
-        self._arrays = [buffer.array(self.program) for buffer in buffers]
+        parts = source_parts(["position.frag"])
+        self.program = self.own(compile_program(context, "shadow maps", parts))
+        self._arrays = [self.own(buffer.array(self.program)) for buffer in buffers]
         corners = (s.vertices[:, :3].reshape(-1, 3, 3).astype(np.float64) for s in scene.surfaces)
         self.solids = [Solid.analyse(triangles) for triangles in corners]
         self.low, self.high = scene.low, scene.high
@@ -119,10 +121,6 @@ class Casters:
         eye = np.append(camera.eye, 1.0)
         return Visible(places, outline(places), [s.from_outside(eye) for s in self.solids])
 
-    def release(self) -> None:
-        for thing in (*self._arrays, self.program):
-            thing.release()
-
 
 def outline(places: Real) -> Real:
     """Return the corners of the convex hull of points (n, 3), or all points of a flat set."""
@@ -147,7 +145,7 @@ def _winding(triangles: Real) -> int:
     return int(np.sign(np.einsum("ni,ni->", a, np.cross(b, c))))
 
 
-class ShadowMap:
+class ShadowMap(Resources):
     """Shadow map, which is redrawn for each light.
 
     size : texels a side.
@@ -156,10 +154,10 @@ class ShadowMap:
     def __init__(self, casters: Casters, size: int = SIZE) -> None:
         self.casters, self.size = casters, size
         context = casters.context
-        self.texture = context.depth_texture((size, size))
+        self.texture = self.own(context.depth_texture((size, size)))
         self.texture.compare_func = ""
         self.texture.filter = (context.NEAREST, context.NEAREST)
-        self._frame = context.framebuffer(depth_attachment=self.texture)
+        self._frame = self.own(context.framebuffer(depth_attachment=self.texture))
 
     def draw(self, light: Lamp, visible: Visible, shift: tuple[float, float]) -> dict[str, Uniform]:
         """Draw the map of a light, and return uniforms of shaders/shadow.glsl.
@@ -220,10 +218,6 @@ class ShadowMap:
         moved[:3, 3] = -eye
         scale = float((high - low).max()) / self.size * 2.0 * far * near / (far - near)
         return matrix @ moved, scale
-
-    def release(self) -> None:
-        self._frame.release()
-        self.texture.release()
 
 
 def parallel_view(

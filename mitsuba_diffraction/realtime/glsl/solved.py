@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,17 +12,15 @@ from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...optics.orders import least_c
 from ...orders import OrderTable
-from ...orders.cells import Counts
 from ...orders.daylight import ENDS, daylight_weights
-from ...orders.rows import kept, kinds_of, leaving_transmittance, rows
+from ...orders.rows import kept, leaving_transmittance
 from ...plugin.description import Surface
+from ...shading import orders
 from .lobes import AZIMUTHS, RINGS, pack_lobes
-from .texels import PAGE, Packed, Texture
+from .texels import Packed, Texture
 
-#: Cells of a tile along τ, ρ and w, in air and under a layer, whose critical angles lie along w;
-#: fewer where a table would need more memory than this.
-CELLS, CELLS_UNDER_LAYER, MOST_BYTES = Counts(32, 24, 6), Counts(20, 14, 12), 48 << 20
-
+#: Largest size of the efficiencies, bytes.
+MOST_BYTES = 48 << 20
 
 # lobes: directions and wavelengths of the mean efficiencies
 _DIRECTIONS, _WAVELENGTHS = 32, 24
@@ -31,6 +28,8 @@ _DIRECTIONS, _WAVELENGTHS = 32, 24
 
 class SolvedSurface:
     """Table of solved orders of a surface as textures and constants."""
+
+    height_room = np.inf  # nothing depends on a height scale
 
     def __init__(self, described: Surface, table: OrderTable) -> None:
         self.described, self.table = described, table
@@ -67,52 +66,14 @@ def pack_orders(
     sigma : standard deviation of the amplitude window, µm.
     most_bytes : size of the efficiencies at most.
     """
-    packed = pack_efficiencies(table, most_bytes) | Packed((), {"sigma": sigma})
-    if method != "fast":
-        return packed
-    weights = daylight_weights(sigma, table.period)
-    smoothed = weights.smoothed.astype(np.float16)
-    order_0 = np.column_stack([weights.order_0[:, :3], 1e-3 * weights.wavelengths])
-    return packed | Packed(
-        (
-            Texture("daylight", smoothed, smooth=True),
-            Texture("order_0", order_0[None].astype(np.float32)),
-        ),
-        {"daylight_waves": weights.waves, "daylight_variances": weights.variances},
-        {"DAYLIGHT": ""},
-    )
-
-
-@functools.lru_cache(maxsize=4)
-def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed:
-    """Pack efficiencies for shaders/orders.glsl, with all reflections within a clear layer.
-
-    Bands follow each other, kind A of a band before its kind B. A row of a kind has a tile for each
-    channel of the leaving light, and one for their sum outside of the layer.
-
-    most_bytes : size of the texture at most.
-    """
-    counts = cells_within(table, most_bytes)
-    tiles = []
-    for of in kinds_of(table):
-        values = rows(table, of, counts)
-        whole = values.through.sum(axis=-1, keepdims=True)
-        row = np.concatenate([values.within, whole], axis=-1).astype(np.float16)
-        groups = 3 * np.arange(counts.w // 3)[:, None] + np.arange(4)
-        # (τ, ρ, group, w, j, q) to (tile, τ, group ρ, w)
-        row = row[:, :, groups].transpose(4, 5, 0, 2, 1, 3)
-        tiles.append(row.reshape(-1, counts.tau + 1, groups.shape[0] * (counts.rho + 1), 4))
-    joined = np.concatenate(tiles)
-    columns = PAGE // joined.shape[2]
-    joined = np.pad(joined, [(0, -len(joined) % columns), (0, 0), (0, 0), (0, 0)])
-    _, height, width, _ = joined.shape
-    picture = joined.reshape(-1, columns, height, width, 4).swapaxes(1, 2)
+    packed = orders.pack_orders(table, most_bytes)
     low, high = table.wavelengths
-    return Packed(
-        (Texture("efficiencies", picture.reshape(-1, columns * width, 4), smooth=True),),
+    efficiencies = Packed(
+        (Texture("efficiencies", packed.pixels, smooth=True),),
         {
-            "order_cells": tuple(map(float, counts)),
-            "order_columns": columns,
+            "sigma": sigma,
+            "order_cells": tuple(map(float, packed.counts)),
+            "order_columns": packed.columns,
             "last_band": float(table.last_band),
             "period": table.period,
             "superstrate": table.superstrate,
@@ -123,19 +84,19 @@ def pack_efficiencies(table: OrderTable, most_bytes: int = MOST_BYTES) -> Packed
         },
         {"ORDERS": "", **({} if table.superstrate == 1.0 else {"FACE": ""})},
     )
-
-
-def cells_within(table: OrderTable, most_bytes: int) -> Counts:
-    """Return the numbers of cells of a texture of this size at most."""
-    counts = CELLS if table.superstrate == 1.0 else CELLS_UNDER_LAYER
-    tiles = sum(of.ports * (of.ports + 1) for of in kinds_of(table))
-    while max(counts) > 4:
-        half_floats = (counts.tau + 1) * (counts.rho + 1) * (counts.w // 3) * 4
-        if 2 * half_floats * tiles <= most_bytes:
-            break
-        tau, rho, w = (max(min(n, 4), 3 * n // 4) for n in counts)
-        counts = Counts(tau, rho, max(w - w % 3, 3))
-    return counts
+    if method != "fast":
+        return efficiencies
+    weights = daylight_weights(sigma, table.period)
+    smoothed = weights.smoothed.astype(np.float16)
+    order_0 = np.column_stack([weights.order_0[:, :3], 1e-3 * weights.wavelengths])
+    return efficiencies | Packed(
+        (
+            Texture("daylight", smoothed, smooth=True),
+            Texture("order_0", order_0[None].astype(np.float32)),
+        ),
+        {"daylight_waves": weights.waves, "daylight_variances": weights.variances},
+        {"DAYLIGHT": ""},
+    )
 
 
 def order_power(table: OrderTable, sigma: float, edges: Real) -> Real:

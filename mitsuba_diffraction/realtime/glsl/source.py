@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 from ...errors import check_choice
@@ -36,11 +36,6 @@ _PREAMBLES = {
 }
 
 
-def vertex_source(dialect: Dialect = "desktop", name: str = "surface.vert") -> str:
-    """Return the source of the vertex stage, which all methods share."""
-    return _PREAMBLES[dialect] + shader_file(name)
-
-
 def fragment_parts(
     method: str,
     definitions: Mapping[str, str],
@@ -58,16 +53,19 @@ def fragment_parts(
     files += [name for definition, name in further.items() if definition in definitions]
     if "WEIGHTED" in definitions or "LOOKED_UP" in definitions:
         files += ["obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl"]
-    return _parts(
+    return source_parts(
         [*files, *method_files(method, definitions), "surface.frag"], definitions, dialect
     )
 
 
-def _parts(
-    files: Sequence[str], definitions: Mapping[str, str], dialect: Dialect
+def source_parts(
+    files: Sequence[str], definitions: Mapping[str, str] | None = None, dialect: Dialect = "desktop"
 ) -> list[tuple[str, str]]:
-    """Return names and texts of a preamble with these definitions, and of files."""
-    known = _CONSTANTS | dict(definitions)
+    """Return names and texts of a preamble with these definitions, and of files.
+
+    files : names of files, or `formulas`; the last one has the stage's main function.
+    """
+    known = _CONSTANTS | dict(definitions or {})
     lines = [f"#define {name} {value}\n" for name, value in known.items()]
     preamble = _PREAMBLES[dialect] + "".join(lines)
     return [("preamble", preamble), *((name, part(name, known)) for name in files)]
@@ -99,18 +97,14 @@ def method_files(method: str, definitions: Mapping[str, str]) -> list[str]:
     return [*files, *(["diffraction.glsl"] if "DIFFRACTING" in definitions else [])]
 
 
-def plain_source(
-    name: str,
-    shared: Sequence[str] = (),
-    definitions: Mapping[str, str] | None = None,
-    dialect: Dialect = "desktop",
-) -> str:
-    """Return the source of a stage that depends on neither surfaces nor tables.
-
-    shared : files that it includes, or `formulas`.
-    """
-    parts = _parts([*shared, name], definitions or {}, dialect)
+def joined(parts: Iterable[tuple[str, str]]) -> str:
+    """Return the source of a stage, of the texts of its parts."""
     return "".join(text for _, text in parts)
+
+
+def web_source(*files: str, definitions: Mapping[str, str] | None = None) -> str:
+    """Return the source of a stage for WebGL; parameters as of `source_parts`."""
+    return joined(source_parts(files, definitions, "web"))
 
 
 def display_definitions(view: str) -> dict[str, str]:

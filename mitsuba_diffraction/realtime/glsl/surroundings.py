@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...arrays import Real
 from ...errors import DiffractionError
 from ...scene.elements import name_of
-from .lights import area_of, emitted_radiance, radiance_along
+from .lights import AROUND_SUN, area_of, emitted_radiance, radiance_along
 from .scene import sample_normal
 from .shadows import frame_along
 from .texels import Packed, Texture, Uniform, as_half, pack_grid
@@ -38,7 +38,6 @@ _AT_ONCE = 1 << 20  # points at a time
 _SKY = (128, 256)  # rows and columns of an environment without a picture, and the fewest of one
 _LARGEST = (512, 1024)  # most rows and columns
 _SUN_RADIUS = np.radians(0.2679)  # Mitsuba's radius of the sun
-_AROUND_SUN = np.radians(0.6)  # radius around the sun that only drawn lights represent
 _FLATS = 12  # largest number of flat shapes
 
 
@@ -123,7 +122,7 @@ class Environment:
 
     def in_sun(self, directions: Real) -> NDArray[np.bool_]:
         """Return which of (n, 3) unit vectors point to the sun, as a mask."""
-        return np.asarray(directions @ self.sun > np.cos(_AROUND_SUN))
+        return np.asarray(directions @ self.sun > np.cos(AROUND_SUN))
 
     @property
     def total(self) -> float:
@@ -214,8 +213,8 @@ def beside(sun: Real, directions: Real) -> Real:
     """Turn unit vectors (..., 3) that point to the sun, if any, aside, to the sky's light alone."""
     if not sun.any():
         return directions
-    aside = sun + np.tan(1.5 * _AROUND_SUN) * frame_along(sun)[0]
-    inside = directions @ sun > np.cos(_AROUND_SUN)
+    aside = sun + np.tan(1.5 * AROUND_SUN) * frame_along(sun)[0]
+    inside = directions @ sun > np.cos(AROUND_SUN)
     return np.where(inside[..., None], aside / np.linalg.norm(aside), directions)
 
 

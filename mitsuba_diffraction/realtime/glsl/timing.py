@@ -9,7 +9,7 @@ import numpy as np
 
 from .context import VertexBuffer, compile_program, set_uniforms
 from .renderer import Renderer
-from .source import LIGHTS
+from .source import LIGHTS, fragment_parts
 from .texels import Uniform
 
 #: Width and height of the timed pictures.
@@ -73,7 +73,8 @@ def _triangle(renderer: Renderer, method: str) -> tuple[Any, Callable[[], object
     surfaces = renderer.scene.surfaces
     number = next(n for n, s in enumerate(surfaces) if s.material.diffraction is not None)
     surface, tables = renderer.bindings[number], renderer.tables(method)[number]
-    program = compile_program(renderer.context, method, surface.definitions | tables.definitions)
+    parts = fragment_parts(method, surface.definitions | tables.definitions)
+    program = compile_program(renderer.context, f"method {method}", parts)
     corners = np.array([[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]])
     vertices = np.zeros((3, 17), np.float32)
     vertices[:, :2] = corners
@@ -84,7 +85,7 @@ def _triangle(renderer: Renderer, method: str) -> tuple[Any, Callable[[], object
     uniforms: dict[str, Uniform] = {
         "view_projection": tuple(np.eye(4).ravel().tolist()), "eye": _EYE,
         "light_place": np.array([_LIGHT] * LIGHTS, np.float32),
-        "light_colour": np.ones((LIGHTS, 3), np.float32), "height_scale": 1.0,
+        "light_colour": np.ones((LIGHTS, 3), np.float32),
     }  # fmt: skip
 
     def bind() -> None:

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,27 +18,23 @@ from numpy.typing import NDArray
 from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
-from ...progress import Progress, silent
+from ...progress import Progress, showing, silent, tracked
 from ..glsl.methods import WEB_METHODS, check_methods, refusal
 from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene
 from ..glsl.shader_materials import Diffracting
-from ..glsl.source import (
-    display_definitions,
-    fragment_parts,
-    plain_source,
-    vertex_source,
-)
+from ..glsl.source import display_definitions, fragment_parts, web_source
 from .light import packed_light, packed_surroundings
-from .material_choices import INDEXED, changeable, packed_materials
+from .material_choices import INDEXED, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
 from .tables import DIGITS, strongest_orders, web_table
 
 #: Largest size of a page, bytes.
 MAX_BYTES = 25_000_000
 
-#: Height scales of the tables for energy conservation, log2 of the factor on the scene's scale.
+#: Height scales of the tables for energy conservation, log2 of the factor on the scene's scale; a
+#: page has those that its tables serve.
 OCTAVES = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5)
 
 #: Upper bound of a page's shaders, scripts and styles, bytes.
@@ -99,8 +95,10 @@ def make_page(
     if title is None:
         is_file = isinstance(scene, str | os.PathLike)
         title = Path(scene).stem if is_file else "Diffraction"
-    progress(0, 0, "packing surfaces and light")
-    writer = _Writer(PackedScene(scene, sensor, [2.0**n for n in OCTAVES]), bounces)
+    progress(0, 0, "reading the scene")
+    with showing(progress):
+        packed = PackedScene(scene, sensor, OCTAVES)
+        writer = _Writer(packed, bounces, progress)
     header, data = writer.written(title, methods, view, progress)
     text = _filled(header, data)
     if len(text.encode()) > MAX_BYTES:
@@ -158,29 +156,12 @@ def _filled(header: dict[str, Any], data: bytes) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda place: parts[place[1]], file("page.html"))
 
 
-@dataclass(frozen=True)
-class _Tables:
-    """Rounded tables of all surfaces for one method.
+class _Table(NamedTuple):
+    """Rounded table for a method: its sections and definitions, and loss as of `web_table`."""
 
-    Attributes
-    ----------
-    parts, definitions : sections and definitions of each table.
-    loss : largest mean and largest 99th percentile of the ΔE2000 from the exact tables.
-    """
-
-    parts: list[dict[str, Any]]
-    definitions: list[Mapping[str, str]]
+    parts: dict[str, Any]
+    definitions: Mapping[str, str]
     loss: tuple[float, float]
-
-    @classmethod
-    def rounded(
-        cls, method: str, surfaces: Sequence[Diffracting], digits: int, sections: Sections
-    ) -> _Tables:
-        """Round and store tables."""
-        packed, losses = zip(*(web_table(method, one, digits) for one in surfaces), strict=True)
-        mean, most = map(max, zip(*losses, strict=True))
-        parts = [packed_parts(each, sections) for each in packed]
-        return cls(parts, [each.definitions for each in packed], (mean, most))
 
 
 class _Writer:
@@ -189,7 +170,7 @@ class _Writer:
     Each method writes the entries of the header that it returns.
     """
 
-    def __init__(self, packed: PackedScene, bounces: bool) -> None:
+    def __init__(self, packed: PackedScene, bounces: bool, progress: Progress) -> None:
         self._packed, self._sections = packed, Sections()
         self._sources: list[str] = []
         self._surfaces = [
@@ -197,13 +178,13 @@ class _Writer:
                 "mesh": packed_mesh(surface.scene.vertices, self._sections),
                 "parts": packed_parts(surface.packed, self._sections),
             }
-            for surface in packed.surfaces
+            for surface in tracked(packed.surfaces, progress, "packing surfaces")
         ]
         self._light = packed_light(packed, self._sections)
         self._coats = sorted({coat for s in packed.surfaces if (coat := _coat(s)) is not None})
         self._materials = packed_materials(self._coats, self._sections)
         self._around, self._around_definitions = packed_surroundings(
-            packed, self._sections, bounces
+            packed, self._sections, bounces, progress
         )
 
     def written(
@@ -223,8 +204,8 @@ class _Writer:
             "around": self._around,
             "materials": self._materials,
             # ends of the slider of height scales, and pages of energy scales
-            "octaves": (OCTAVES[0], OCTAVES[-1]),
-            "energy_pages": len(OCTAVES),
+            "octaves": (self._packed.octaves[0], self._packed.octaves[-1]),
+            "energy_pages": len(self._packed.octaves),
             **self._tables(fitted),
             **self._shaded(fitted),
             **_shaders(view),
@@ -235,7 +216,7 @@ class _Writer:
 
     def _fitted(
         self, methods: Sequence[str], progress: Progress
-    ) -> tuple[dict[str, _Tables], dict[str, str]]:
+    ) -> tuple[dict[str, list[_Table]], dict[str, str]]:
         """Round the tables of all methods to as many digits as fit into the page, and store them.
 
         Returns the tables of each method that is shown, and why others are left out.
@@ -249,9 +230,11 @@ class _Writer:
         shown = [method for method in methods if method not in left_out]
         while shown:
             for digits in DIGITS:
-                progress(0, 0, f"rounding tables to {digits} digits")
                 self._sections = others.copy()
-                fitted = {m: _Tables.rounded(m, diffracting, digits, self._sections) for m in shown}
+                fitted = {
+                    method: [self._rounded(method, one, digits) for one in diffracting]
+                    for method in tracked(shown, progress, f"rounding tables to {digits} digits")
+                }
                 excess = self._sections.nbytes - (MAX_BYTES - CODE_BYTES) // 4 * 3
                 if excess <= 0:
                     return fitted, left_out
@@ -264,22 +247,28 @@ class _Writer:
             "coherence_width, or a shallower surface"
         )
 
-    def _tables(self, fitted: Mapping[str, _Tables]) -> dict[str, Any]:
-        """Return sections of each table and its loss by method; brightest orders of each table."""
+    def _rounded(self, method: str, surface: Diffracting, digits: int) -> _Table:
+        """Round a table, and store it."""
+        packed, loss = web_table(method, surface, digits)
+        return _Table(packed_parts(packed, self._sections), packed.definitions, loss)
+
+    def _tables(self, fitted: Mapping[str, list[_Table]]) -> dict[str, Any]:
+        """Return sections of each table, largest losses by method, and brightest orders."""
+        losses = {m: zip(*(t.loss for t in tables), strict=True) for m, tables in fitted.items()}
         return {
-            "tables": {method: tables.parts for method, tables in fitted.items()},
-            "loss": {method: tables.loss for method, tables in fitted.items()},
+            "tables": {method: [t.parts for t in tables] for method, tables in fitted.items()},
+            "loss": {method: tuple(map(max, pairs)) for method, pairs in losses.items()},
             "orders": [strongest_orders(table.described) for table in self._packed.diffracting],
         }
 
-    def _shaded(self, fitted: Mapping[str, _Tables]) -> dict[str, Any]:
+    def _shaded(self, fitted: Mapping[str, list[_Table]]) -> dict[str, Any]:
         """Return the surfaces, and the section of all distinct sources of their shaders."""
         surfaces = []
         for surface, stored in zip(self._packed.surfaces, self._surfaces, strict=True):
             definitions = {
                 method: dict(surface.packed.definitions)
                 if surface.table is None
-                else {**surface.packed.definitions, **tables.definitions[surface.table]}
+                else {**surface.packed.definitions, **tables[surface.table].definitions}
                 for method, tables in fitted.items()
             }
             surfaces.append({**stored, **self._surface(surface, definitions)})
@@ -323,23 +312,26 @@ class _Writer:
 
 
 def _coat(surface: PackedSurface) -> float | None:
-    """Return the index of a surface's coat, 1 without one; None if its material cannot change."""
+    """Return the index of a surface's coat, 1 without one; None if its material cannot change.
+
+    The materials of solved orders and of mirrors cannot.
+    """
     diffraction = surface.scene.material.diffraction
-    if diffraction is None or not changeable(diffraction):
+    if diffraction is None or diffraction.described.index is None:
         return None
     return diffraction.described.coat or 1.0
 
 
 def _shaders(view: str) -> dict[str, Any]:
     """Return the sources that do not depend on surfaces."""
-    display = plain_source(
-        "shown.frag", ("library.glsl", "formulas"), display_definitions(view), "web"
+    display = web_source(
+        "library.glsl", "formulas", "shown.frag", definitions=display_definitions(view)
     )
     return {
         "mains": {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")},
-        "vertex": vertex_source("web"),
-        "shadow": plain_source("position.frag", dialect="web"),
-        "shown": {"vertex": vertex_source("web", "whole.vert"), "fragment": display},
+        "vertex": web_source("surface.vert"),
+        "shadow": web_source("position.frag"),
+        "shown": {"vertex": web_source("whole.vert"), "fragment": display},
     }
 
 

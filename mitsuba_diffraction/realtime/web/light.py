@@ -13,16 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
+from ...progress import Progress
 from ..glsl.lights import Lamp
 from ..glsl.packed_scene import PackedScene
 from ..glsl.packing import WAVENUMBERS, pack_responses
-from ..glsl.source import plain_source
+from ..glsl.source import web_source
 from ..glsl.texels import shortened
 from .sections import Sections, converted, packed_array, packed_parts
 
 #: Number of lights in the sequence; their mean is the scene's light.
 SAMPLES = 256
 
+_PACKING = "packing light"  # in progress
 _FIRST, _LAST, _STEP = 380.0, 780.0, 5.0  # wavelengths of monochromatic light, nm
 _MIN_COSINE = float(np.cos(np.radians(3.0)))  # lights within this angle of a direction move with it
 
@@ -86,7 +88,7 @@ def _monochrome() -> NDArray[np.float64]:
 
 
 def packed_surroundings(
-    packed: PackedScene, sections: Sections, bounces: bool
+    packed: PackedScene, sections: Sections, bounces: bool, progress: Progress
 ) -> tuple[dict[str, Any] | None, dict[str, str]]:
     """Return the page's data of surroundings, as JSON types, and definitions for the shaders.
 
@@ -97,16 +99,21 @@ def packed_surroundings(
     """
     if packed.emitters is None or not (packed.looks_up or bounces):
         return None, {}
-    parts = packed.around | converted(packed.obstacles, {"obstacles": _coarser})
+    progress(0, 3, _PACKING)
+    parts = converted(packed.around, {"obstacles": _coarser})
+    progress(1, 3, _PACKING)
     if bounces:
         parts |= packed.bounces
+    progress(2, 3, _PACKING)
     # rounding adds no bias: shaders divide by the rounded densities
     digits: dict[str, Any] = {"lobe_places": np.float16, "lobe_densities": shortened}
     lobes = [converted(part, digits) for part in packed.lobes]
     background = None
     if packed.emitters.environment is not None:
-        shared = ("library.glsl", "surroundings.glsl")
-        background = plain_source("background.frag", shared, packed.around.definitions, "web")
+        background = web_source(
+            "library.glsl", "surroundings.glsl", "background.frag",
+            definitions=packed.around.definitions,
+        )  # fmt: skip
     return {
         "bounces": bounces,
         "parts": packed_parts(parts, sections),

@@ -10,7 +10,6 @@ import numpy as np
 from ...optics.materials import METALS, TISSUES
 from ...plugin.conductors import tabulated_index
 from ..glsl.packing import pack_conductor
-from ..glsl.shader_materials import Diffracting
 from ..glsl.texels import Packed, Texture, as_half
 from .sections import Sections, packed_parts
 
@@ -20,11 +19,6 @@ NAMES = {name: name for name in TISSUES} | {
 }
 #: Definition of a surface with a material of `packed_materials`.
 INDEXED = {"SURFACE_KIND": "2"}
-
-
-def changeable(surface: Diffracting | None) -> bool:
-    """Return whether a surface can show another material: solved orders and mirrors cannot."""
-    return surface is not None and surface.described.index is not None
 
 
 def packed_materials(coats: Sequence[float], sections: Sections) -> list[dict[str, Any]]:

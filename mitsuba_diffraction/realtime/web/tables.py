@@ -7,18 +7,20 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Real
 from ...optics.colour import delta_e, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...orders import OrderTable, cells
 from ...orders.cells import Counts
-from ...orders.rows import kinds_of, middles, rows, wavelength_of
+from ...orders.rows import kinds_of, wavelength_of
 from ...plugin.description import Surface
+from ...shading import orders
 from ...tables import DiffractionTable
 from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
 from ...tables.powers import power_series, powers_at
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
-from ..glsl.solved import cells_within, pack_orders
+from ..glsl.solved import pack_orders
 from ..glsl.texels import Packed, shortened
 from .sections import as_columns, converted
 
@@ -74,7 +76,7 @@ def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
 def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounded:
     """Round a table of solved orders, and take fewer cells."""
     packed = pack_orders(method, table, sigma, _ORDER_BYTES)
-    counts = cells_within(table, _ORDER_BYTES)
+    counts = orders.pack_orders(table, _ORDER_BYTES).counts
     width = 4 * (counts.rho + 1)
 
     def fewer(data: NDArray[np.floating]) -> NDArray[np.float16]:
@@ -86,18 +88,19 @@ def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounde
 
 def _solved_loss(table: OrderTable, counts: Counts, digits: int) -> NDArray[np.float64]:
     """Return the ΔE2000 (n,) of orders in the middles of cells, which are farthest from nodes."""
+
+    def stored(nodes: Real) -> NDArray[np.float16]:
+        return rounded(nodes.transpose(0, 3, 4, 2, 1), digits).transpose(0, 4, 3, 1, 2)
+
     losses = []
     of_bands = [of for of in kinds_of(table) if of.kind == cells.A]
     for of in of_bands[:: max(1, len(of_bands) // _BANDS)]:
-        fine = rows(table, of, Counts(*(2 * n for n in counts)))
-        nodes = fine.within[::2, ::2, ::2]
-        lines = rounded(nodes.transpose(0, 3, 4, 2, 1), digits).transpose(0, 4, 3, 1, 2)
-        exact, face = (values[1::2, 1::2, 1::2] for values in fine)
+        exact, face, read = orders.centres(table, of, counts, stored)
         rho, w = ((np.arange(n) + 0.5) / n for n in (counts.rho, counts.w))
         lam = wavelength_of(table, (of.band + cells.sine_squared(rho))[:, None], w)
         colours = linear_srgb(response(lam.ravel())).reshape(*lam.shape, 1, 1, 3)
         passed = (face / np.maximum(exact, 1e-12))[..., None] * colours
-        difference = delta_e(exact[..., None] * passed, middles(lines)[..., None] * passed)
+        difference = delta_e(exact[..., None] * passed, read[..., None] * passed)
         losses.append(difference[np.isfinite(difference)])
     return np.concatenate(losses)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.realtime.glsl.context import Bindings
-from mitsuba_diffraction.realtime.glsl.source import fragment_parts, vertex_source
+from mitsuba_diffraction.realtime.glsl.source import fragment_parts, joined, source_parts
 from mitsuba_diffraction.realtime.glsl.texels import (
     Packed,
     Texture,
@@ -65,13 +65,13 @@ def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArra
     parts = packed | Packed(
         (Texture("places", picture),), {"light_colour": np.ones((4, 3), np.float32)}
     )
-    source = "".join(text for _, text in fragment_parts(method, parts.definitions)[:-1])
+    source = joined(fragment_parts(method, parts.definitions)[:-1])
     return drawn(gl, source + _PROBE, parts, (len(places), 1))
 
 
 def drawn(gl: Any, source: str, parts: Packed, size: tuple[int, int]) -> NDArray[np.float64]:
     """Colours (n, 3) that a fragment shader draws over a picture of this size."""
-    vertex = vertex_source(name="whole.vert")
+    vertex = joined(source_parts(["whole.vert"]))
     program = gl.program(vertex_shader=vertex, fragment_shader=source)
     bindings = Bindings(gl, parts)
     target = gl.texture(size, 4, dtype="f4")

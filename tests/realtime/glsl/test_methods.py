@@ -32,13 +32,12 @@ from mitsuba_diffraction.realtime.glsl.packing import (
 )
 from mitsuba_diffraction.realtime.glsl.source import (
     fragment_parts,
-    vertex_source,
+    joined,
+    web_source,
 )
 from mitsuba_diffraction.realtime.glsl.texels import (
-    PAGE,
     Packed,
     half_error,
-    listed,
     paired,
     shortened,
 )
@@ -252,12 +251,12 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
         excess = DirectionalTable(np.array([550.0]), 0.0 * scale[None])
         definitions |= pack_directions([excess, excess], [scale, scale]).definitions
         definitions |= pack_boundary(MODELS["small_slope"], table.roughness).definitions
-    compile_program(gl, method, definitions).release()
+    compile_program(gl, method, fragment_parts(method, definitions)).release()
     if "GL_ARB_ES3_compatibility" not in gl.extensions:
         pytest.skip(f"{gl.info['GL_RENDERER']} compiles no GLSL ES")
     gl.program(
-        vertex_shader=vertex_source("web"),
-        fragment_shader="".join(text for _, text in fragment_parts(method, definitions, "web")),
+        vertex_shader=web_source("surface.vert"),
+        fragment_shader=joined(fragment_parts(method, definitions, "web")),
     ).release()
 
 
@@ -266,7 +265,7 @@ def test_a_shader_that_does_not_compile_is_named_with_its_line(gl: Any) -> None:
     body = dict(fragment_parts("exact", {}))["exact.glsl"].split("\n")
     line = next(n for n, text in enumerate(body, 1) if text.startswith("float series("))
     with pytest.raises(DiffractionError) as caught:
-        compile_program(gl, "exact", definitions)
+        compile_program(gl, "method exact", fragment_parts("exact", definitions))
     assert f"compile method exact: exact.glsl, line {line}: " in str(caught.value)
     assert "two" in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -285,13 +284,6 @@ def test_the_logs_of_other_compilers_are_understood(log: str) -> None:
 def test_an_unknown_method_is_refused_with_the_choices() -> None:
     with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of fast, exact"):
         fragment_parts("phong", {})
-
-
-def test_lists_keep_their_order_over_rows() -> None:
-    entries = np.arange(2 * PAGE + 10, dtype=np.float32)[:, None].repeat(4, axis=1)
-    data = listed("numbers", entries).data
-    assert data.shape == (3, PAGE, 4)
-    np.testing.assert_array_equal(data.reshape(-1, 4)[: len(entries)], entries)
 
 
 def test_half_floats_are_taken_where_they_hold(table: DiffractionTable) -> None:

@@ -8,7 +8,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, bsdf_dict, gratings
+from mitsuba_diffraction import DiffractionError, DiffractionTable, bsdf_dict, gratings
+from mitsuba_diffraction.realtime.glsl.packed_scene import PackedScene
 from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of
 from mitsuba_diffraction.realtime.glsl.shadows import Solid, outline
 from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
@@ -90,6 +91,17 @@ def test_no_ray_slips_through_a_large_triangle(some_variant: str) -> None:
     x, y, z = ((inside - low) / cell).astype(int).T
     assert (texels[z, y, x] == 0).mean() > 0.9
     assert texels[z, y, x].max() <= 4 * 3**0.5
+
+
+def test_relief_ends_where_a_table_does(some_variant: str) -> None:
+    """Beyond it powers would be those at its end, and scales of energy extrapolated."""
+    field = gratings.sinusoidal(1.6, 0.05, periods=2)
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
+    for most, octaves in ((1.0, (-1.0, 0.0)), (1.5, (-1.0, 0.0, 0.5))):
+        table = DiffractionTable.build(field, coherence_width=6, height_scale_max=most)
+        surface = bsdf_dict(table, energy_conserving=False)
+        scene = {"type": "scene", "disk": {"type": "disk", "bsdf": surface}, "sensor": sensor}
+        assert PackedScene(mi.load_dict(scene), 0, (-1.0, 0.0, 0.5)).octaves == octaves
 
 
 def test_attributes_that_are_missing_and_places_are_refused(some_variant: str) -> None:

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from mitsuba_diffraction import DiffractionTable, HeightField, bsdf_dict, reference
+from mitsuba_diffraction import HeightField, bsdf_dict, reference
 from mitsuba_diffraction.optics.display import VIEWS, shown
 from mitsuba_diffraction.plugin.description import Surface
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.maps import axis_map
 from mitsuba_diffraction.realtime.glsl.modelled import Modelled
-from mitsuba_diffraction.realtime.glsl.packing import pack_colours
 from mitsuba_diffraction.realtime.glsl.shader_materials import (
     GLSL,
     ShaderMaterial,
@@ -24,16 +23,14 @@ from mitsuba_diffraction.realtime.glsl.shader_materials import (
     pack_surface,
     packed_by,
 )
-from mitsuba_diffraction.realtime.glsl.source import display_definitions, plain_source
+from mitsuba_diffraction.realtime.glsl.source import display_definitions, joined, source_parts
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
-from mitsuba_diffraction.tables.colour import cached_colours
 from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed, shaded
 from tests.support.descriptions import CHANGES, ELSEWHERE, base
 from tests.support.directions import polar
 from tests.support.kinds import COATED, SLOPE
 from tests.support.lanes import interaction, vectors
 from tests.support.layered import PATCH, WIDTH, load, pairs
-from tests.support.patches import SPECKLE
 from tests.support.pictures import largest_difference, ramp
 
 STRETCH, WAVELENGTH = 0.7, 550.0
@@ -81,15 +78,6 @@ def test_scaled_light_vanishes_at_the_horizon(
     assert factors[2] < 0.1 < 0.7 < factors[0]
 
 
-def test_colours_of_one_window_are_read_as_they_are(gl: Any) -> None:
-    colours = cached_colours(DiffractionTable.build(**SPECKLE))
-    rng = np.random.default_rng(2)
-    places = np.stack([*rng.normal(0.0, 0.4, (2, 300)), rng.uniform(0.02, 2.0, 300), np.ones(300)])
-    found = probed(gl, "fast", pack_colours(colours) | PERFECT, places.T)
-    expected = colours.colour(*places[:3])
-    assert difference(found, expected) < 3e-3  # eight digits of each number
-
-
 def test_gloss_is_mitsuba_s_and_a_base_burley_s(gl: Any) -> None:
     mi.set_variant("scalar_spectral_polarized")
     alpha, roughness = 0.3, 0.55
@@ -113,17 +101,6 @@ def test_gloss_is_mitsuba_s_and_a_base_burley_s(gl: Any) -> None:
     lost = (1.0 - 0.5 * fifth[0]) * (1.0 - 0.5 * fifth[1])
     back = thrown * (fifth[0] + fifth[1] + fifth[0] * fifth[1] * (thrown - 1.0))
     assert_allclose(found[:, 1], lost + back, rtol=1e-4)
-
-
-def test_the_page_turns_a_patch_to_the_left(gl: Any) -> None:
-    turn, value = np.radians(30.0), "vec4(patch_frame(vec2(0.0), vec3(0.6, 0.8, 0.7)), 0.0, 1.0)"
-    parts = PERFECT | Packed(
-        uniforms={"patch_turn": (np.cos(turn), np.sin(turn))},
-        definitions={"LIVE": "", "VALUE": value},
-    )
-    (found,) = probed(gl, "fast", parts, np.zeros((1, 4)))
-    angle = np.arctan2(0.8, 0.6) + turn
-    assert_allclose(found[:2], 0.7 * np.array([np.cos(angle), np.sin(angle)]), rtol=1e-5)
 
 
 def packed_of(described: Surface) -> object:
@@ -151,7 +128,8 @@ void main() { fragment = vec4(displayed(texelFetch(light, ivec2(gl_FragCoord.xy)
 def test_shader_and_numpy_show_the_same(gl, view):
     light = ramp()
     rows, columns, _ = light.shape
-    source = plain_source("shown.frag", ("library.glsl", "formulas"), display_definitions(view))
+    files = ("library.glsl", "formulas", "shown.frag")
+    source = joined(source_parts(files, display_definitions(view)))
     source = source.partition("// Picture of a page")[0] + SHOW
     parts = Packed((Texture("light", np.pad(light, [(0, 0)] * 2 + [(0, 1)])),))
     found = drawn(gl, source, parts, (columns, rows)).reshape(light.shape)

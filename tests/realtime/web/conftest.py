@@ -19,14 +19,23 @@ def scene() -> Any:
 
 
 @pytest.fixture(scope="session")
-def page() -> Page:
+def told() -> list[tuple[int, int, str]]:
+    """What `page` told of its progress."""
+    return []
+
+
+@pytest.fixture(scope="session")
+def page(told: list[tuple[int, int, str]]) -> Page:
     """The scene's page, with both methods."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0)
         )  # seconds each
         # the title is the worst that a file can be called
-        return make_page(load_scene(), title="</script><script>throw 1</script>", bounces=False)
+        return make_page(
+            load_scene(), title="</script><script>throw 1</script>", bounces=False,
+            progress=lambda *step: told.append(step),
+        )  # fmt: skip
 
 
 @pytest.fixture(scope="session")

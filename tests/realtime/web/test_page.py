@@ -14,7 +14,17 @@ from PIL import Image
 
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.optics.display import shown
+from mitsuba_diffraction.realtime.web.export import Page
 from tests.support.pictures import by_methods, picture
+
+
+def test_all_that_takes_long_says_how_far_it_is(
+    page: Page, told: list[tuple[int, int, str]]
+) -> None:
+    reading, *others = told
+    assert reading[:2] == (0, 0)
+    assert len(others) >= 6
+    assert all(0 <= done < total for done, total, _ in others)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction.realtime.glsl.scene import VERTEX
 from mitsuba_diffraction.realtime.web.sections import (
-    Section,
     Sections,
     packed_array,
     packed_mesh,
@@ -57,16 +56,6 @@ def test_the_smallest_layout_is_chosen() -> None:
     assert packed_array(ramp).layout["differences"]
     noise = rng.integers(0, 2**32, (3000, 1), np.uint32)
     assert not packed_array(noise).layout["differences"]
-
-
-def test_sections_know_where_they_lie() -> None:
-    sections = Sections()
-    numbers = [sections.add(Section(text, {"kind": "file"})) for text in (b"one", b"three", b"")]
-    data, layouts = sections.joined()
-    assert numbers == [0, 1, 2]
-    found = [data[a["start"] : a["start"] + a["length"]] for a in layouts]
-    assert found == [b"one", b"three", b""]
-    assert sections.nbytes == 8
 
 
 @pytest.mark.parametrize("flat", [True, False])

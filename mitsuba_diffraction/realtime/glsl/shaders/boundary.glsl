@@ -83,8 +83,7 @@ vec3 boundary(float cos_half, float r, float z)
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
-    return boundary_factor(index, k * z, height_statistic(k * r));
+    return boundary_factor(index_at(k), k * z, height_statistic(k * r));
 }
 
 // Boundary factor of each channel: the reflectance under daylight, times the ratio of the model's to

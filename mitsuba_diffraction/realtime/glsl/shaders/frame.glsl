@@ -1,5 +1,12 @@
 // The patch's frame at a point of the surface, and whether a surface of a mix is drawn there.
 
+in vec3 v_position;
+in vec3 v_normal;
+in vec3 v_tangent;
+in vec2 v_texcoord;
+in vec3 v_colour;
+in vec3 v_axis;
+
 uniform sampler2D axis_map;       // (cos, sin) of the patch's x axis, and its stretch
 uniform mat3 axis_uv;
 uniform sampler2D mask_map;       // interval of [0, 1) that the surface's weight takes

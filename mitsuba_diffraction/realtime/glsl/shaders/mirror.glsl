@@ -43,11 +43,8 @@ vec3 face(float sigma_0)
 float mirror_at(float k, float sigma_0)
 {
     float cosine = mirrored(k, sigma_0);
-#if defined(COATED) && SURFACE_KIND == CONDUCTOR
-    vec2 index = texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz;
-    float reflected = beneath_reflectance(cosine, coat, index);
-#elif defined(COATED)
-    float reflected = beneath_reflectance(cosine, coat, eta);
+#ifdef COATED
+    float reflected = beneath_reflectance(cosine, coat, index_at(k));
 #else
     float reflected = reflectance_at(cosine, k);
 #endif

@@ -1,11 +1,5 @@
 // Point under the page's cursor: directions of eye and light in the patch's axes.
 
-in vec3 v_position;
-in vec3 v_normal;
-in vec3 v_tangent;
-in vec2 v_texcoord;
-in vec3 v_axis;
-
 uniform vec3 eye;
 uniform vec4 light_place[LIGHTS];
 uniform float surface_number;

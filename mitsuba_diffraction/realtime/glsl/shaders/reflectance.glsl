@@ -36,12 +36,14 @@ int row_at(float k)
 }
 
 float reflectance_at(float cos_i, float k) { return in_row(reflectances, cos_i, row_at(k)).r; }
+vec2 index_at(float k) { return texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz; }
 
 #else
 
 #if SURFACE_KIND == DIELECTRIC
 uniform float eta;               // index inside over index outside
 float reflectance_at(float cos_i, float k) { return interface_reflectance(cos_i, eta); }
+float index_at(float k) { return eta; }
 #else
 float reflectance_at(float cos_i, float k) { return 1.0; }
 #endif

@@ -1,13 +1,6 @@
 // Shade one fragment: under lights, or by surroundings looked up along its lobes (LOOKED_UP). Each
 // method defines `diffracted`.
 
-in vec3 v_position;
-in vec3 v_normal;
-in vec3 v_tangent;
-in vec2 v_texcoord;
-in vec3 v_colour;
-in vec3 v_axis;
-
 uniform vec3 eye;
 uniform vec4 light_place[LIGHTS];   // w = 0: direction to the light; w = 1: position
 uniform vec3 sky[4];              // irradiance over π: mean, and gradient along x, y, z

@@ -353,13 +353,4 @@ class Drawing {
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, frame ? gl.FLOAT : gl.UNSIGNED_BYTE, frame ? PIXEL.floats : PIXEL.bytes);
   }
-
-  // Read the mean of the samples, linear sRGB and coverage, from the bottom row up.
-  read(count) {
-    const { gl, width, height } = this;
-    const numbers = new Float32Array(4 * width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.sums[0].frame);
-    gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, numbers);
-    return numbers.map((x) => x / count);
-  }
 }

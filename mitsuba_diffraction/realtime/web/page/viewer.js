@@ -41,7 +41,6 @@ class Viewer {
     this.finest = 0;      // finest level that is fast enough
     this.changed = 0;
     this.dirty = true;
-    this.waiting = [];
     this.lost = true;     // whether nothing can be drawn: before all is loaded, and without a context
     this.report = () => {};
   }
@@ -169,11 +168,6 @@ class Viewer {
     else if (this.dirty || !this.latest?.moving) this.glance();
     const still = !moving && !this.dirty && this.latest && !this.latest.moving;
     if (!still || this.count < this.enough) this.wake();
-    if (still)
-      this.waiting = this.waiting.filter(({ count, resolve }) => {
-        if (this.count >= count) resolve();
-        return this.count < count;
-      });
   }
 
   // Draw stand-ins for the meshes: the driver prepares its programs while these are decoded.
@@ -262,15 +256,6 @@ class Viewer {
   // Show the samples so far, with the current exposure.
   present() {
     if (this.shown) this.drawing.show(this.shown, this.count, this.exposure, this.half);
-  }
-
-  // Resolve when a still picture has so many samples; fail after some ms.
-  settled(count = this.enough, patience = 120e3) {
-    this.wake();
-    return new Promise((resolve, reject) => {
-      this.waiting.push({ count, resolve });
-      setTimeout(() => reject(new Error(`no ${count} samples in ${patience / 1e3} s`)), patience);
-    });
   }
 
   // Change method, wavelength, coherence, material or kind of light, after compiling the programs.
