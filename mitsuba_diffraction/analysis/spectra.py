@@ -151,7 +151,7 @@ def spectrum(
         sigma = described.sigma
         if described.material:
             check_material(described.material, lam)
-        check_lit(described, lam)
+        check_lit(described, lam, light, light_azimuth)
     signals = _signals(bsdf, sigma, geometry, lam, before, progress)
     if relative == "white":
         half = math.radians(0.5 * acceptance)

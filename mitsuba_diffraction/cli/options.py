@@ -54,6 +54,13 @@ TABLE = (
 TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
 
 
+# Options that a method of the thesis does not use.
+_UNUSED: dict[str, tuple[str, ...]] = {
+    "spectral": ("period", "terms"), "flss": ("period",), "nmm": (),
+    "pq": ("period", "coherence"), "pq-sinc": ("period", "coherence"),
+    "rainbow": ("coherence", "tolerance", "terms", "step"),
+}  # fmt: skip
+
 #: A patch, which `load_patch` reads.
 SOURCE = ("SOURCE", "heights of any format, or a recipe (.toml)", Path)
 #: Options for reading heights by names of files; `analysis.treatments`.
@@ -243,9 +250,8 @@ def retired_row(name: str, count: int) -> Row:
 
 
 def given(args: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
-    """Return the values of options without defaults that are on the command line, by name."""
-    values = {name: getattr(args, name, None) for name in names}
-    return {k: v for k, v in values.items() if v is not None and v is not False and v != []}
+    """Return the values of options that are on the command line, by name."""
+    return {name: getattr(args, name) for name in names if name in args.given}
 
 
 def option_of(args: argparse.Namespace, name: str) -> str:
@@ -254,15 +260,28 @@ def option_of(args: argparse.Namespace, name: str) -> str:
     return str(action.option_strings[-1] if action.option_strings else action.metavar)
 
 
-def refuse(
-    args: argparse.Namespace, names: Iterable[str], why: str, before: str = "argument "
-) -> None:
+def flags_of(*parsers: argparse.ArgumentParser) -> dict[str, str]:
+    """Return the options of parsers by the names of their values; later parsers precede."""
+    actions = (action for parser in parsers for action in parser._actions)
+    return {each.dest: each.option_strings[-1] for each in actions if each.option_strings}
+
+
+def refuse(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
     """Refuse the first of the options that is on the command line, with a usage error.
 
-    why, before : the message after and before the option.
+    why : the message after the option.
     """
     for name in given(args, names):
-        args.parser.error(f"{before}{option_of(args, name)}{why}")
+        args.parser.error(f"argument {option_of(args, name)}{why}")
+
+
+def refuse_of_table(args: argparse.Namespace, file: Path, names: Iterable[str]) -> None:
+    """Refuse the first option whose value a table has in itself, with a DiffractionError."""
+    for name in given(args, names):
+        raise DiffractionError(
+            f"'{file}' is a table, which has its own; leave {option_of(args, name)} out, or give "
+            "heights"
+        )
 
 
 def heights() -> Group:
@@ -337,6 +356,12 @@ def method(default: str | None, text: str) -> tuple[Row, Row]:
     """Return the rows of the method that sums the spectrum, and of the period that some need."""
     period = "µm, for the methods that need one; default: estimated from the heights"
     return ("--method", text, NAMES, default), ("--period D", period, float)
+
+
+def refuse_unused(args: argparse.Namespace, used: Iterable[str] = ()) -> None:
+    """Refuse options that have no effect with --method, but for those that the command uses."""
+    names = [name for name in _UNUSED[args.method] if name not in used]
+    refuse(args, names, f": has no effect with --method {args.method}; leave it out")
 
 
 def samples(least: int, default: int | None) -> tuple[Row, Row]:

@@ -151,8 +151,11 @@ def load_by_plan(
 
 
 def check_plan_options(args: argparse.Namespace) -> None:
-    """Refuse options of a plan without one; a usage error."""
-    for name, default in (("paths", PATHS), ("plan_tolerance", TOLERANCE)):
-        if args.plan is None and getattr(args, name) != default:
-            option = options.option_of(args, name)
-            args.parser.error(f"argument {option}: is for --plan, which is missing")
+    """Refuse options of a plan that is not made; a usage error."""
+    made = ("paths", "plan_tolerance")
+    if args.plan is None:
+        options.refuse(args, made, ": is for --plan, which is missing")
+    elif args.plan:
+        options.refuse(
+            args, made, ": has no effect on the recipes of --plan; leave one of both out"
+        )

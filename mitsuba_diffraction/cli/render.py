@@ -228,6 +228,8 @@ def _check_colours(args: argparse.Namespace, output: Path, scene: Any, sensor: A
 def _run_frames(args: argparse.Namespace) -> Figures:
     """Render the frames that are missing or outdated, then the film; return the figures."""
     folder, film = _folder_and_film(args)
+    if film is None:
+        options.refuse(args, ["fps"], ": is for a film; name one, e.g. -o NAME.mp4")
     check_outputs(_files_of_frames(args, folder), make_folder=True)
     if film is not None:
         check_film(film)

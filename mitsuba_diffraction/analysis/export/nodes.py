@@ -221,7 +221,7 @@ def laid(
         )
     require_loaded_llvm()
     surface = FILES.described(bsdf)
-    check_lit(surface, grid.wavelengths)
+    check_lit(surface, grid.wavelengths, grid.theta, grid.phi)
     shortest, longest = (float(wavenumber(grid.wavelengths[n])) for n in (0, -1))
     lobe = 1.0 / (math.sqrt(2.0) * surface.sigma * shortest)
     solved = surface.solved and surface.nested is None and lobe < 0.5 * nodes.size
