@@ -130,8 +130,7 @@ def gain_of(args: argparse.Namespace) -> Any:
     Raises a DiffractionError if --int-ior is not a number.
     """
     if not args.relative:
-        if args.int_ior is not None:
-            args.parser.error("argument --int-ior: only for --relative, or without a method")
+        options.refuse(args, ["int_ior"], ": only for --relative, or without a method")
         return None
     if args.int_ior is None:
         return Gain()
@@ -276,8 +275,6 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
     options.refuse_unused(args)
     if args.illuminant != "D65":
         args.parser.error("argument --method: is under --illuminant D65 only")
-    if not args.relative:
-        options.refuse(args, ["int_ior"], ": with argument --method, only for --relative")
 
 
 def surface_bsdf(args: argparse.Namespace) -> Any:

@@ -74,9 +74,8 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _addon(args: argparse.Namespace) -> Figures:
     """Pack the add-on, and return the figures."""
-    others = args.given - {"command", "addon", "folders", "json", "debug", "progress"}
-    options.refuse(
-        args, sorted(others - (set() if args.folders else {"mode"})),
+    options.refuse_others(
+        args, ["addon", "folders" if args.folders else "mode"],
         ": not allowed with argument --addon; export the surface into a folder first, and name it "
         "by --with",
     )  # fmt: skip

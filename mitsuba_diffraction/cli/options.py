@@ -61,6 +61,9 @@ _UNUSED: dict[str, tuple[str, ...]] = {
     "rainbow": ("coherence", "tolerance", "terms", "step"),
 }  # fmt: skip
 
+# Names that every command has.
+_GENERAL = ("command", "json", "debug", "progress")
+
 #: A patch, which `load_patch` reads.
 SOURCE = ("SOURCE", "heights of any format, or a recipe (.toml)", Path)
 #: Options for reading heights by names of files; `analysis.treatments`.
@@ -273,6 +276,11 @@ def refuse(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
     """
     for name in given(args, names):
         args.parser.error(f"argument {option_of(args, name)}{why}")
+
+
+def refuse_others(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
+    """Refuse the first option or argument beside these and the general ones, as `refuse` does."""
+    refuse(args, sorted(args.given - {*_GENERAL, *args.retired, *names}), why)
 
 
 def refuse_of_table(args: argparse.Namespace, file: Path, names: Iterable[str]) -> None:

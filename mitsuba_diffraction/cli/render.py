@@ -38,7 +38,7 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED, keep_in_mind
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
-from .report import Figures, check_outputs, elapsed, exr_and_png, output_name, output_of
+from .report import Figures, check_outputs, elapsed, exr_and_png, output_of
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
 
@@ -230,7 +230,6 @@ def _run_frames(args: argparse.Namespace) -> Figures:
     folder, film = _folder_and_film(args)
     if film is None:
         options.refuse(args, ["fps"], ": is for a film; name one, e.g. -o NAME.mp4")
-    check_outputs(_files_of_frames(args, folder), make_folder=True)
     if film is not None:
         check_film(film)
         check_outputs([film])
@@ -295,7 +294,7 @@ def _frames_on_workers(
 def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
     """Return the folder of the frames, and the film, if there is one."""
     default = Path(f"{args.name.stem}_frames")
-    output = output_name(args.output, default, partial(_files_of_frames, args))
+    output = output_of(args, default, partial(_files_of_frames, args), make_folder=True)
     if output.suffix.lower() in FILMS:
         return output.with_suffix(""), output
     if output.suffix:
@@ -307,7 +306,9 @@ def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
 
 
 def _files_of_frames(args: argparse.Namespace, folder: Path) -> list[Path]:
-    """Return the files of the frames in a folder."""
+    """Return the files of the frames in a folder, or of a film's."""
+    if folder.suffix.lower() in FILMS:
+        folder = folder.with_suffix("")
     suffixes = (".png", ".exr") if args.exr else (".png",)
     return [folder / f"frame_{n:04d}{s}" for n in range(args.frames) for s in suffixes]
 

@@ -15,7 +15,7 @@ from ..heights.read import read_heights
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
-from .report import Figures, check_outputs, output_name
+from .report import Figures, check_outputs, output_of
 from .workers import WORKERS, executor_for
 
 if TYPE_CHECKING:
@@ -24,11 +24,8 @@ if TYPE_CHECKING:
     from ..orders.solve.recipes import SolvedRecipe
     from ..orders.solve.settings import Estimate
 
-#: Options that an imported file does not have.
-_SOLVED_ONLY = (
-    "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin", "block",
-    "theta", "phi", "step", "jobs", "workers", "scheduler", "crossed",
-)  # fmt: skip
+#: Options of an imported file.
+_IMPORTED = ("source", "output", "period", "period_y", "superstrate", "imports")
 #: Options that override fields of a recipe.
 _OF_A_RECIPE = (
     "material", "superstrate", "thin", "block", "output", "substrate", "layers", "beneath",
@@ -128,16 +125,13 @@ def run(args: argparse.Namespace) -> Figures:
     from ..orders.solve.accuracy import missed_tolerance
 
     source = Path(args.source)
-    output = output_name(args.output, Path(f"{source.stem}.nc"))
     if args.imports:
         from ..orders.imported import read_orders
 
         if args.period is None:
             args.parser.error("argument --import: needs --period, µm")
-        options.refuse(
-            args, (*_SOLVED_ONLY, *_SETTINGS), ": is for a solution; --import has efficiencies"
-        )
-        check_outputs([output])
+        options.refuse_others(args, _IMPORTED, ": is for a solution; --import has efficiencies")
+        output = output_of(args, Path(f"{source.stem}.nc"))
         period = (args.period, args.period_y) if args.period_y else args.period
         table: OrderTable = read_orders(source, period, superstrate=args.superstrate or 1.0)
     else:
