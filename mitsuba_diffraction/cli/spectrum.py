@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -108,9 +107,8 @@ def run(args: argparse.Namespace) -> Figures:
     first = next(iter(groups))
     repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
     default = Path(f"{first or files[0].stem}-spectrum.csv")
-    output = output_of(args, default, partial(_files, args, repeated))
-    written = _files(args, False, output)
-    errors, angular = _beside(output, "errors"), _beside(output, "iridescence")
+    output = output_of(args, default, lambda name: _files(args, repeated, name).values())
+    files_of = _files(args, repeated, output)
     lam = _wavelengths(args)
     eye, light = _eye(args, lam)
     detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
@@ -141,21 +139,23 @@ def run(args: argparse.Namespace) -> Figures:
         common = everything[first][0].wavelength
         say(f"columns are from {common[0]:g} to {common[-1]:g} nm, which every table has")
     spectra = {name: mean_spectra(parts) for name, parts in everything.items()}
+    if all(each.error is None for each in spectra.values()):
+        files_of.pop("errors", None)
+    else:
+        files_of_spectra.save_errors(spectra, files_of["errors"])
     files_of_spectra.save_csv(spectra, output)
-    if any(each.error is not None for each in spectra.values()):
-        written.append(errors)
-        files_of_spectra.save_errors(spectra, errors)
-    files_of_spectra.save_colours(spectra, written[2])
+    files_of_spectra.save_colours(spectra, files_of["colours"])
     if eye is not None:
-        files_of_spectra.save_catches(spectra, eye, light, *written[3:5])
+        files_of_spectra.save_catches(spectra, eye, light, *(files_of[name] for name in _SEEN))
     if args.iridescence:
-        files_of_spectra.save_angular(spectra, angular)
+        files_of_spectra.save_angular(spectra, files_of["iridescence"])
     title, turned = _title(groups, args), files_of_spectra.EACH if auto and repeated else ""
     shown = spectra[first]
     lam = shown.wavelength
     beside = {} if measured is None else _compared(args, *measured, lam, shown.value[:, 0])
     figure = files_of_spectra.spectra_figure(spectra, title, turned, measured)
-    save_figure(written[1], figure)
+    save_figure(files_of["plot"], figure)
+    written = list(files_of.values())
     print(
         f"{' and '.join(map(str, written))}: "
         f"{counted(len(shown.geometry.detectors), 'spectrum', 'spectra')} of "
@@ -245,17 +245,14 @@ def _measured(
     return measured
 
 
-def _files(args: argparse.Namespace, repeated: bool, output: Path) -> list[Path]:
-    """Return the files of -o, with standard errors of `repeated` scans."""
+def _files(args: argparse.Namespace, repeated: bool, output: Path) -> dict[str, Path]:
+    """Return the files of -o by content, with standard errors of `repeated` scans."""
     names = [
         "colours", *(_SEEN if args.observer is not None else ()),
         *(["iridescence"] if args.iridescence else []), *(["errors"] if repeated else []),
     ]  # fmt: skip
-    return [output, output.with_suffix(".png"), *(_beside(output, name) for name in names)]
-
-
-def _beside(output: Path, name: str) -> Path:
-    return output.with_name(f"{output.stem}-{name}.csv")
+    tables = {name: output.with_name(f"{output.stem}-{name}.csv") for name in names}
+    return {"spectra": output, "plot": output.with_suffix(".png"), **tables}
 
 
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:
