@@ -27,9 +27,6 @@ from .report import Figures
 #: The values that `add_option` takes after the group.
 Row = tuple[Any, ...]
 
-#: Default of --wavelength-range and of --step, nm.
-WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
-
 #: Numbers of an option that accepts ranges, at most.
 _MOST_NUMBERS = 10_000
 
@@ -102,9 +99,10 @@ def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
     return path
 
 
-def whole_number(least: int) -> Callable[[str], int]:
+def whole_number(least: int, most: int = 2**31 - 1) -> Callable[[str], int]:
     """Return a type of argument: a whole number of at least `least` that fits 31 bits."""
-    return _number(int, least, 2**31 - 1, f"a whole number from {least}")
+    end = f" to {most}" if most < 2**31 - 1 else ""
+    return _number(int, least, most, f"a whole number from {least}{end}")
 
 
 def number_between(low: float, high: float) -> Callable[[str], float]:
@@ -131,7 +129,7 @@ STOPS = number_between(-100, 100)
 def numbers(text: str) -> tuple[float, ...]:
     """Type of argument: values and FIRST:LAST:STEP, joined by commas."""
     try:
-        return tuple(n for part in text.split(",") for n in numbers_of(part, _MOST_NUMBERS))
+        return tuple(n for part in text.split(",") for n in _range_of(part))
     except ValueError as error:
         raise argparse.ArgumentTypeError(
             "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
@@ -147,12 +145,12 @@ def limits(text: str) -> tuple[float, float]:
     raise argparse.ArgumentTypeError(f"expected FIRST:LAST, such as 400:700, got {quoted(text)}")
 
 
-def numbers_of(text: str, most: int) -> list[float]:
-    """Return a number, or at most so many from FIRST to LAST by STEP; else raise a ValueError."""
+def _range_of(text: str) -> list[float]:
+    """Return a number, or numbers from FIRST to LAST by STEP; else raise a ValueError."""
     if ":" not in text:
         return [float(text)]
     first, last, step = (float(part) for part in text.split(":"))
-    if not (step > 0.0 and last >= first and (last - first) / step < most):
+    if not (step > 0.0 and last >= first and (last - first) / step < _MOST_NUMBERS):
         raise ValueError(text)
     return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
 
@@ -350,14 +348,14 @@ def direction(theta: float = 0.0, phi: float | None = 0.0) -> tuple[Row, Row]:
 #: Limits of the spectrum and its step, nm; see `wavelengths`.
 SPECTRUM = (
     *table(("wavelength_range",)),
-    ("--step NM", f"between wavelengths; default: {STEP:g}", float),
+    ("--step NM", "between wavelengths", float, 5.0),
 )
 
 
 def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments `wavelength_range` and `step`, nm."""
-    step = STEP if args.step is None else args.step
-    return {"wavelength_range": tuple(args.wavelength_range or WAVELENGTH_RANGE), "step": step}
+    span = tuple(args.wavelength_range or TableSettings.wavelength_range)
+    return {"wavelength_range": span, "step": args.step}
 
 
 def method(default: str | None, text: str) -> tuple[Row, Row]:

@@ -89,10 +89,8 @@ def run(args: argparse.Namespace) -> Figures:
             args.parser.error(
                 "argument --plan: is for one picture; with --frames, camera and light may leave it"
             )
-        args.fps = args.fps or 24.0
         return _run_frames(args)
-    if moving or args.exr or args.fps:
-        args.parser.error("--animate, --turn, --exr and --fps belong to --frames: say how many")
+    options.refuse(args, ("animate", "turn", "exr", "fps"), ": belongs to --frames; say how many")
     if eye is None and on_workers(args):
         return _on_workers(args)
     return _run_one(args, eye)

@@ -345,7 +345,7 @@ USAGE = {
     },
     "plan scale.xml": {
         "--paths 1": "expected a whole number from 2",
-        f"--paths {2**23}": "--paths: at most",
+        f"--paths {2**23}": "--paths: expected a whole number from 2 to 4194304",
     },
     _RENDER: {
         "-D spp": "-D",
@@ -363,8 +363,9 @@ USAGE = {
         "--illuminant leaves": "--observer; name one",
         "--observer dog --tonemap natural": "--tonemap: has no effect",
         "--frames 2": "say what changes, with --animate or --turn",
-        _LIGHT: "belong to --frames",
-        "--fps 3": "belong to --frames",
+        _LIGHT: "--animate: belongs to --frames",
+        "--fps 3": "--fps: belongs to --frames",
+        "--fps 24": "--fps: belongs to --frames",
         f"--frames 0 {_LIGHT}": "expected a whole number from 1",
     },
     _FRAMES: {
