@@ -97,7 +97,7 @@ def surface_options(*, turned: bool = True) -> options.Group:
         *([("--orientation DEG", "angle of the patch", float)] if turned else []),
         ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
         *options.table(tuple(_TABLE), **_TABLE),
-        options.retired_row("second_order", 1),
+        options.retired_row("second_order"),
     ))  # fmt: skip
 
 

@@ -131,7 +131,7 @@ def build_parser() -> argparse.ArgumentParser:
         prog=PROGRAM, description="Diffraction of measured height fields, for Mitsuba 3."
     )
     _add_common(parser)
-    parser.set_defaults(debug=False, progress=None, json=None, retired=())
+    parser.set_defaults(debug=False, progress=None, json=None)
     parser.add_argument(
         "--version", action="version", version=f"{PROGRAM} {version('mitsuba_diffraction')}"
     )
@@ -173,7 +173,7 @@ def _run(args: argparse.Namespace) -> int:
         note_arguments(args)
         report = [args.json] if args.json not in (None, STDOUT) else []
         check_outputs(report)
-        retired(args.retired)
+        retired(sorted(args.given))
         args.began, args.code = time.perf_counter(), DONE
         figures = args.run(args)
         for file in report if figures else []:

@@ -19,6 +19,7 @@ from ..heights.coherence import resolved
 from ..heights.read import OPTIONS
 from ..heights.source import notes_line
 from ..optics.display import VIEWS
+from ..retired import REPLACED
 from ..settings import SETTINGS, TableSettings, checked
 from ..tables.build.checks import check_units, check_window, period_of, warnings_of
 from ..thesis.methods import NAMES
@@ -235,19 +236,9 @@ def add_option(
     group.add_argument(*names, **{**how, **more})
 
 
-class _Retired(argparse.Action):
-    """Option of an earlier version, whose name is kept for the line about it."""
-
-    def __call__(
-        self, parser: Any, namespace: argparse.Namespace, values: Any, option: Any = None
-    ) -> None:
-        namespace.retired = (*getattr(namespace, "retired", ()), self.dest)
-
-
-def retired_row(name: str, count: int) -> Row:
-    """Return the row of an option of an earlier version, with so many values; see `retired`."""
-    more = {"action": _Retired, "nargs": count, "default": argparse.SUPPRESS}
-    return _option(name), argparse.SUPPRESS, None, None, more
+def retired_row(name: str, kind: type | None = None) -> Row:
+    """Return the row of an option of an earlier version, which `retired` names; bool of a flag."""
+    return _option(name), argparse.SUPPRESS, kind
 
 
 def given(args: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
@@ -278,7 +269,7 @@ def refuse(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
 
 def refuse_others(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
     """Refuse the first option or argument beside these and the general ones, as `refuse` does."""
-    refuse(args, sorted(args.given - {*_GENERAL, *args.retired, *names}), why)
+    refuse(args, sorted(args.given - {*_GENERAL, *REPLACED, *names}), why)
 
 
 def refuse_of_table(args: argparse.Namespace, file: Path, names: Iterable[str]) -> None:

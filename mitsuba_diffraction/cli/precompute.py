@@ -36,7 +36,7 @@ from .workers import WORKERS, client_of, on_workers
     options.heights(),
     options.Group("the table", (
         *options.table(), *options.table(("wavelength_range",)),
-        options.retired_row("second_order", 1),
+        options.retired_row("second_order"),
     )),
     WORKERS,
     options.json("the table's summary"),

@@ -111,7 +111,7 @@ def _layer(text: str) -> Layers:
          "or more; order_x, order_y for order make a crossed grating; needs --period", bool, None,
          {"dest": "imports"}),
     )),
-    options.retired_row("accept", 0),
+    options.retired_row("accept", bool),
     ("--jobs N", "processes here; default: 1", whole_number(1)),
     WORKERS,
     options.json("the table's summary"),
