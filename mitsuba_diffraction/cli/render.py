@@ -75,20 +75,16 @@ def run(args: argparse.Namespace) -> Figures:
     take_studio(args)
     scene_options.put_on_stage(args)
     eye = eye_of(args)
-    if on_workers(args) and args.plan is not None:
-        args.parser.error("argument --plan: is for one process; leave the workers out")
+    if on_workers(args):
+        options.refuse(args, ("plan", "denoise"), ": is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
     if args.denoise:
-        if on_workers(args):
-            args.parser.error("argument --denoise: is for one process; leave the workers out")
         optional("pyoidn")
     if args.frames is not None:
         if not moving:
             args.parser.error("argument --frames: say what changes, with --animate or --turn")
-        if args.plan is not None:
-            args.parser.error(
-                "argument --plan: is for one picture; with --frames, camera and light may leave it"
-            )
+        why = ": is for one picture; with --frames, camera and light may leave it"
+        options.refuse(args, ["plan"], why)
         return _run_frames(args)
     options.refuse(args, ("animate", "turn", "exr", "fps"), ": belongs to --frames; say how many")
     if eye is None and on_workers(args):
