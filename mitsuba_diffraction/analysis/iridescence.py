@@ -29,10 +29,9 @@ from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import sigma_of, wavenumber
-from ..plugin.memory import upload
 from ..tables import DiffractionTable
 from ..tables.powers import order_0_power, power_series
-from .maps.hemisphere import flat_interaction
+from .maps.hemisphere import flat_interaction, vectors
 from .maps.result import LightDirection
 
 #: Coherence width of the index, µm; its lobes are 3.3° wide (half maximum, 550 nm, at the normal),
@@ -159,8 +158,7 @@ class MaterialFactor:
         cosine = np.maximum(np.cos(polar), 1e-4)
         sine = np.sqrt(1.0 - cosine**2)
         columns = sine * np.cos(azimuth), sine * np.sin(azimuth), cosine
-        x, y, z = (upload(mi.Float, c.ravel().astype(np.float32)) for c in columns)
-        wo = mi.Vector3f(x, y, z)
+        wo = vectors(np.stack([column.ravel() for column in columns], axis=-1))
         si = flat_interaction(mi.Vector3f(light.direction.tolist()), cosine.size)
         factors, excesses = [], []
         wavelengths = np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP)

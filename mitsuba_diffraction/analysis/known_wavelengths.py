@@ -1,8 +1,11 @@
-"""Wavelengths at which a surface is known: its material, its pigment, and the tables of a mean."""
+"""Light for which a surface is known: its material, its pigment, and its table."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Real
 from ..errors import DiffractionError
@@ -46,8 +49,17 @@ def check_material(material: str | None, wavelengths: Real, pigment: str | None 
             )
 
 
-def check_lit(surface: Surface, wavelengths: Real) -> None:
-    """Refuse wavelengths (n,) in nm of which a surface's table has no light."""
+def check_lit(surface: Surface, wavelengths: Real, theta: ArrayLike, phi: ArrayLike) -> None:
+    """Refuse wavelengths (n,) in nm of which a surface's table has no light.
+
+    Warns of light, from θ and φ in degrees, outside the directions that solved orders list.
+    """
+    if surface.solved:
+        from ..orders.listed import warn_of_other_directions
+
+        inside = np.sin(np.radians(np.atleast_1d(theta))) / surface.orders.superstrate
+        turned = np.atleast_1d(phi) - surface.orientation.number
+        warn_of_other_directions(surface.orders, np.degrees(np.arcsin(inside)), turned)
     low, high = surface.lit
     unlit = wavelengths[(wavelengths < low) | (wavelengths > high)]
     if not unlit.size:

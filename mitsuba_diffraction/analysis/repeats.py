@@ -47,10 +47,14 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
     files: dict[Path, None] = {}
     for name in names:
         if name.is_dir():
-            shown = [f for f in sorted(name.iterdir()) if f.is_file() and f.name[0] != "."]
-            held = [f for f in shown if f.suffix.lower() not in _NO_SCANS]
+            held = _held(name)
             if not held:
-                raise DiffractionError(f"'{name}' holds no scans; name another folder")
+                deeper = any(_held(f) for f in name.iterdir() if f.is_dir())
+                raise DiffractionError(
+                    f"'{name}' holds no scans"
+                    + (f" itself; name those in its folders, '{name / '*' / '*'}'" if deeper
+                       else "; name another folder")
+                )  # fmt: skip
             if not all(kind_of(file) is FileKind.RESULT for file in held):
                 note_folder(name)  # else that of an earlier survey, which this one may go on
         elif not name.exists() and glob.has_magic(str(name)):
@@ -72,6 +76,12 @@ def scan_files(names: Iterable[Path]) -> list[Path]:
     for file in scans:
         note_files(file)
     return scans
+
+
+def _held(folder: Path) -> list[Path]:
+    """List the files of a folder that may be scans."""
+    shown = [f for f in sorted(folder.iterdir()) if f.is_file() and f.name[0] != "."]
+    return [f for f in shown if f.suffix.lower() not in _NO_SCANS]
 
 
 def sample_of(file: Path, repeats: str = "name") -> str:

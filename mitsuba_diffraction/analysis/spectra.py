@@ -34,7 +34,7 @@ from ..plugin.memory import upload
 from ..progress import Progress, silent
 from .known_wavelengths import check_lit, check_material, known_range
 from .maps.evaluate import opaque
-from .maps.hemisphere import flat_interaction
+from .maps.hemisphere import flat_interaction, vectors
 from .spectrometer import (
     MeasurementGeometry,
     across_plane,
@@ -151,7 +151,7 @@ def spectrum(
         sigma = described.sigma
         if described.material:
             check_material(described.material, lam)
-        check_lit(described, lam)
+        check_lit(described, lam, light, light_azimuth)
     signals = _signals(bsdf, sigma, geometry, lam, before, progress)
     if relative == "white":
         half = math.radians(0.5 * acceptance)
@@ -220,7 +220,7 @@ def brdf_values(bsdf: Any, wi: Real, wo: Real, wavelength: Real) -> Real:
 
     bsdf : of the current variant, spectral and vectorised.
     """
-    light, view = (mi.Vector3f(*(upload(mi.Float, c) for c in d.T)) for d in (wi, wo))
+    light, view = vectors(wi), vectors(wo)
     si = flat_interaction(view, len(wo))
     si.wavelengths = mi.UnpolarizedSpectrum(upload(mi.Float, wavelength))
     f = mi.unpolarized_spectrum(bsdf.eval(mi.BSDFContext(), si, light))[0]
@@ -264,7 +264,7 @@ def _integrals(
     """
     light = light_direction(geometry)
     directions, weights = map(np.concatenate, zip(*cones, strict=True))
-    view = mi.Vector3f(*(upload(mi.Float, column) for column in directions.T))
+    view = vectors(directions)
     si = flat_interaction(view, len(directions))
     towards = mi.Vector3f(opaque(light))
     turned = (weights * directions[:, 2] / light[2]).reshape(len(cones), -1)

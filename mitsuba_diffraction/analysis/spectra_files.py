@@ -135,13 +135,17 @@ def colour_of(spectra: Spectra) -> Real:
     return encode_srgb(_BRIGHTEST * linear / np.where(brightest > 0.0, brightest, 1.0))
 
 
-def spectra_figure(groups: Groups | Spectra, title: str = "", azimuth: str = "") -> Figure:
+def spectra_figure(
+    groups: Groups | Spectra, title: str = "", azimuth: str = "",
+    measured: tuple[Real, Real] | None = None,
+) -> Figure:  # fmt: skip
     """Draw spectra over wavelength, with bands of one standard error.
 
     Each curve has its own colour; of several groups, each group one. From `MAPPED` detectors on a
     map of angle and wavelength stands beside.
 
     azimuth : of the lamp in words, where the scans of a mean have several.
+    measured : wavelengths, nm, and values (n,) of a curve to draw in black beside.
     """
     if isinstance(groups, Spectra):
         groups = {"": groups}
@@ -159,6 +163,10 @@ def spectra_figure(groups: Groups | Spectra, title: str = "", azimuth: str = "")
     }
     axes[0].set(xlabel="wavelength (nm)", ylabel=against[first.relative])
     _scale(axes[0], *groups.values())
+    if measured is not None:
+        lam, value = measured[0], 100.0 * measured[1]
+        axes[0].plot(lam, value, color="black", lw=1.0, label="measured")
+        axes[0].set_ylim(top=max(axes[0].get_ylim()[1], 1.08 * float(value.max())))
     turned = {each.geometry.azimuth for each in groups.values()}
     azimuth = azimuth or (f"{geometry.azimuth:.4g}°" if len(turned) == 1 else EACH)
     axes[0].set_title(

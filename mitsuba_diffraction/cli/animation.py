@@ -20,7 +20,7 @@ ANIMATION = (
     ("--turn KEY", "angle of the scene, degrees, that turns once around, e.g. sun_azimuth; may be "
      "given several times", [str]),
     ("--exr", "write a linear EXR of each frame, too", bool),
-    ("--fps N", "frames a second; default: 24", number_between(1, 100)),
+    ("--fps N", "frames a second", number_between(1, 100), 24.0),
 )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from ..analysis.maps import (
 from ..analysis.media import medium_index
 from ..analysis.scans import bsdf_of, check_surface
 from ..errors import DiffractionError, DiffractionWarning, counted
-from ..files import FileKind, kind_of
+from ..files import FileKind, kind_of, readable_file
 from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..optics.materials import TISSUES
@@ -45,6 +45,11 @@ _TABLE = {
 _SURFACE = (
     "material", "int_ior", "ext_ior", "coat_ior", "layers", "pigment", "model", "orientation",
     "height_scale",
+)  # fmt: skip
+#: Options of a surface that a table of solved orders has in itself.
+OF_ORDERS = (
+    *(name for name in _SURFACE if name != "orientation"),
+    *(name for name in _TABLE if name != "coherence_width"), *options.HEIGHTS,
 )  # fmt: skip
 # Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
@@ -92,7 +97,7 @@ def surface_options(*, turned: bool = True) -> options.Group:
         *([("--orientation DEG", "angle of the patch", float)] if turned else []),
         ("--height-scale S", "factor on the heights", number_between(1e-6, 1000)),
         *options.table(tuple(_TABLE), **_TABLE),
-        options.retired_row("second_order", 1),
+        options.retired_row("second_order"),
     ))  # fmt: skip
 
 
@@ -104,7 +109,14 @@ def take_source(args: argparse.Namespace) -> None:
     """
     if (args.source is None) == (args.preset is None):
         args.parser.error("name either SOURCE or --preset NAME")
-    if args.preset is not None:
+    if args.preset is None:
+        readable_file(args.source)
+    else:
+        if "," in args.preset:
+            args.parser.error(
+                f"argument --preset: {args.preset!r}: name the preset alone, and change it by "
+                "options of the surface"
+            )
         args.source = find_preset(args.preset).patch
     surface_parameters(args)
     if args.pigment is not None:
@@ -118,8 +130,7 @@ def gain_of(args: argparse.Namespace) -> Any:
     Raises a DiffractionError if --int-ior is not a number.
     """
     if not args.relative:
-        if args.int_ior is not None:
-            args.parser.error("argument --int-ior: only for --relative, or without a method")
+        options.refuse(args, ["int_ior"], ": only for --relative, or without a method")
         return None
     if args.int_ior is None:
         return Gain()
@@ -255,26 +266,27 @@ def _by_method(
 def _refuse_contradictions(args: argparse.Namespace) -> None:
     """Refuse contradictory options that argparse does not find, with a usage error."""
     if args.wavelength is not None:
-        many = ("wavelength_range", "step", "exposure", "spectral")
-        options.refuse(args, many, "", "argument --wavelength: not allowed with argument ")
+        many = ("wavelength_range", "step", "exposure", "spectral", "illuminant")
+        options.refuse(args, many, ": has no effect with one --wavelength; leave one of both out")
     if args.method is None:
         options.refuse(args, ("period", "relative"), ": only with argument --method")
         return
     options.refuse(args, _OF_THE_BSDF, ": not allowed with argument --method")
+    options.refuse_unused(args)
     if args.illuminant != "D65":
         args.parser.error("argument --method: is under --illuminant D65 only")
-    if not args.relative:
-        options.refuse(args, ["int_ior"], ": with argument --method, only for --relative")
 
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     parameters = options.table_options(args, tuple(_TABLE)) | surface_parameters(args)
+    if args.preset is None:
+        kind = kind_of(args.source)
+        if kind is FileKind.ORDERS:
+            options.refuse_of_table(args, args.source, OF_ORDERS)
+        elif kind is FileKind.TABLE:
+            options.refuse_of_table(args, args.source, ["ext_ior"])
     if (index := medium_index(args.ext_ior)) != 1.0:
-        if args.preset is None and kind_of(args.source) in (FileKind.TABLE, FileKind.ORDERS):
-            raise DiffractionError(
-                f"'{args.source}' is a table of lengths in air; for --ext-ior give its heights"
-            )
         parameters["lateral_scale"] = index
         parameters["height_scale"] = index * (args.height_scale or 1.0)
     parameters |= options.given(args, options.HEIGHTS)

@@ -10,7 +10,7 @@ import re
 import sys
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Self
 
 import mitsuba as mi
@@ -30,6 +30,12 @@ _SAMPLES = (
     "some samples are below zero, as colours outside of sRGB are, or no numbers; they are kept"
 )
 
+# Parameter of Python in a message, but not of a scene (-D) or of one layer.
+_PARAMETER = re.compile(
+    r"(?<![^\s(])(?<!-D )(?<!layer \d: )(?<!layer \d\d: )([a-z]\w*)(=True\b|=(?=\S)|(?![\w=(.']))"
+)
+_flags: Mapping[str, str] = {}  # of the running command, of which a process has one
+
 # Columns and rows of a terminal that reports no size, as in some containers and editors.
 _SIZE = 80, 24
 
@@ -40,9 +46,33 @@ _DELAY = 0.5  # seconds
 EVERY = 10.0
 
 
+def name_flags(flags: Mapping[str, str]) -> None:
+    """Set the command's options by the names of their values, for `flagged`."""
+    global _flags
+    _flags = flags
+
+
+def flagged(text: str) -> str:
+    """Return a message with options of the running command in place of parameters of Python.
+
+    "pixel_size=0.1" becomes "--pixel-size 0.1"; behind the name of a TOML file stand its keys.
+    """
+
+    def option(parameter: re.Match[str]) -> str:
+        name, value = parameter.groups()
+        ahead, behind = before[: parameter.start()], before[parameter.end() :]
+        first = behind.startswith(": ") and ahead in ("", "error: ", "warning: ")
+        if name not in _flags or not (value or "_" in name or first):
+            return parameter[0]
+        return f"{_flags[name]} " if value == "=" else _flags[name]
+
+    before, *keys = text.partition(".toml'")
+    return _PARAMETER.sub(option, before) + "".join(keys)
+
+
 def say(text: str) -> None:
     """Print one line on stderr, above a progress bar if there is one."""
-    line = f"{PROGRAM}: {shortened(one_line(text))}"
+    line = f"{PROGRAM}: {shortened(one_line(flagged(text)))}"
     if "tqdm" in sys.modules:
         from tqdm import tqdm
 

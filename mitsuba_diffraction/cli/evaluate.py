@@ -131,14 +131,11 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _prepared(args: argparse.Namespace) -> _Experiment:
     """Check the options, read the patch, and choose the beam and the viewing angles."""
-    if surface_parameters(args) and args.method != "spectral":
-        raise DiffractionError(
-            f"method={args.method} reflects all light; leave the material out, or the method"
-        )
     from ..thesis.period_fit import Beam
-    from ..thesis.period_fit.ridge import check_axes
+    from ..thesis.period_fit.ridge import check_axes, check_order
     from ..thesis.period_fit.windows import MOST_WINDOWS
 
+    check_order(args.order)
     beam = Beam(args.theta, args.phi or 0.0, medium_index(args.ext_ior))
     if args.period is not None:
         check_period(args.period)
@@ -148,6 +145,13 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
     steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
     viewing_angles(args.angles, args.angle_step, args.theta, args.order)
     patch, settings = options.load_patch(args)
+    ours = _by_table(args, settings)
+    options.refuse_unused(args, ("period", "step", *(["terms"] if ours else [])))
+    if surface_parameters(args) and not ours:
+        choice = f"--method {args.method}" if args.method != "spectral" else "--coherence patch"
+        raise DiffractionError(
+            f"{choice} reflects all light; leave the material out, or {choice.split()[0]}"
+        )
     gratings = dominant_periods(patch)
     if args.phi is None and gratings:
         beam = replace(beam, phi=float(round(gratings[0].direction)))  # known to a degree
@@ -189,10 +193,15 @@ def _measured(
     return response, ridge, fit, [("fitted", line), *lines], figures
 
 
+def _by_table(args: argparse.Namespace, settings: dict[str, Any]) -> bool:
+    """Whether a table's BSDF is measured, not a method of the thesis, which has R = 1."""
+    return args.method == "spectral" and settings.get("coherence") != "patch"
+
+
 def _brdf(args: argparse.Namespace, experiment: _Experiment, bar: Bar) -> tuple[Any, float]:
     """Return the BRDF to measure and σ of its window: a method's, or of a surface of a material."""
     within, settings = experiment.within, experiment.settings
-    if args.method != "spectral" or settings.get("coherence") == "patch":
+    if not _by_table(args, settings):
         method = make(args.method, within.field(), period=args.period, progress=bar, **settings)
         return method.brdf, method.sigma
     steps = experiment.steps
@@ -233,7 +242,8 @@ def _followed(
     from ..thesis.period_fit import FEWEST, Ridge, find_period, fit_period, ridge_of
 
     period = find_period(response, held, order)
-    ridge = ridge_of(response, order, period=period)
+    near = max(held, default=None) if abs(order) > 1 else None  # the first order is brighter
+    ridge = ridge_of(response, order, period=period or near)
     if period is not None:
         fit = fit_period(ridge)
         return ridge, fit, (
@@ -312,7 +322,7 @@ def _windows(
              f"{periods.max():.5g} nm")
         )  # fmt: skip
     try:
-        as_in_thesis = thesis_fit(table, beam, steps, angles, args.order)
+        as_in_thesis = thesis_fit(table, beam, steps, angles, args.order, fit.period)
     except DiffractionError as error:
         lines.append(("thesis", f"its procedure finds no period ({error})"))
     else:

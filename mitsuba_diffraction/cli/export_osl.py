@@ -74,10 +74,11 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _addon(args: argparse.Namespace) -> Figures:
     """Pack the add-on, and return the figures."""
-    if args.source is not None or args.preset is not None or args.output is not None:
-        args.parser.error(
-            "argument --addon: export SOURCE or --preset into a folder first, and name it by --with"
-        )
+    options.refuse_others(
+        args, ["addon", "folders" if args.folders else "mode"],
+        ": not allowed with argument --addon; export the surface into a folder first, and name it "
+        "by --with",
+    )  # fmt: skip
     check_outputs([args.addon])
 
     from ..osl import make_addon

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 
 from ..scene import set_variant
 from . import options
@@ -34,6 +35,9 @@ from .report import Figures, output_of
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the folder, print the colours, and return the figures."""
+    if args.mesh is None:
+        of_label = ("width", "height", "turn", "up")
+        options.refuse(args, of_label, ": is for a label on a mesh; add --mesh FILE")
     from ..scene import label
     from ..scene.logo import areas
 
@@ -55,5 +59,5 @@ def run(args: argparse.Namespace) -> Figures:
         scene = label.write(folder, parts, place, args.mesh, **values)
     for line in label.described(parts):
         print(line)
-    print(f"{scene}: render it, e.g. mitsuba-diffraction render {scene} --denoise")
+    print(f"{scene}: render it, e.g. mitsuba-diffraction render {quote(str(scene))} --denoise")
     return {"scene": scene, "colours": label.described(parts)}

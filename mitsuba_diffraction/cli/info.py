@@ -20,7 +20,7 @@ from ..images import save_figure
 from ..settings import TableSettings
 from ..tables import DiffractionTable
 from . import options
-from .console import Bar, mitsuba_warnings
+from .console import Bar, flagged, mitsuba_warnings
 from .options import path_ending_in
 from .report import STDOUT, Figures, lines_of, plain
 
@@ -52,8 +52,7 @@ _PLOT = path_ending_in(".png", ".pdf", ".svg")
 def run(args: argparse.Namespace) -> Figures:
     """Print the description, and return the figures."""
     if args.formats:
-        others = ("file", "albedo", "energy", "picture", *options.HEIGHTS, *_TABLE)
-        options.refuse(args, others, " with --formats, which is about no file")
+        options.refuse_others(args, ["formats"], " with --formats, which is about no file")
         return _formats(args)
     if args.file is None:
         args.parser.error("name a file, or give --formats")
@@ -88,6 +87,7 @@ def run(args: argparse.Namespace) -> Figures:
 
         save_figure(args.picture, patches_figure(source.fields()), dpi=80)
         data["picture"] = str(args.picture)
+    data |= {name: list(map(flagged, data[name])) for name in ("warnings",) if name in data}
     if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:

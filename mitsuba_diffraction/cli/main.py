@@ -48,8 +48,9 @@ from . import (
     tradeoff,
 )
 from .arguments import note_arguments
-from .console import PROGRAM, say_error, warnings_in_one_line
+from .console import PROGRAM, name_flags, say_error, warnings_in_one_line
 from .interrupt import INTERRUPTED, ended_at_once, say_interrupted
+from .options import flags_of
 from .report import STDOUT, check_outputs, save_json
 from .spellings import current
 
@@ -66,15 +67,28 @@ FAILED = 1
 USAGE = 2
 
 
-class _Parser(argparse.ArgumentParser):
+class Parser(argparse.ArgumentParser):
     """Argument parser whose errors are one line, with the values that they quote shortened.
 
-    Ranges may begin with a minus: -60:60:5 is no option.
+    Ranges may begin with a minus: -60:60:5 is no option. `given` of the result has the names of
+    the values that the command line names, which `options.given` asks for.
     """
 
     def __init__(self, **how: Any) -> None:
         super().__init__(**how)
         self._negative_number_matcher = re.compile(r"^-[\d.]+([:,]-?[\d.]+)*$")
+
+    def parse_known_args(self, *words: Any, **more: Any) -> Any:
+        """Parse; a command's names are kept."""
+        self._given: set[str] = set()
+        args, rest = super().parse_known_args(*words, **more)
+        args.given = self._given | getattr(args, "given", set())
+        return args, rest
+
+    def _get_values(self, action: argparse.Action, texts: list[str]) -> Any:
+        if texts or action.option_strings:
+            self._given.add(action.dest)
+        return super()._get_values(action, texts)
 
     def error(self, message: str) -> NoReturn:
         line = shortened(printable(message))
@@ -93,6 +107,8 @@ def _main(argv: Sequence[str] | None) -> int:
         for text in words:
             check_name(text)
         args, unknown = build_parser().parse_known_args(current(words))
+        # parameters of a scene, -D, have names of Python
+        name_flags({} if "parameters" in args else args.flags | flags_of(args.parser))
         if unknown:  # of the command, whose usage helps
             args.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     except DiffractionError as error:
@@ -111,11 +127,11 @@ def _main(argv: Sequence[str] | None) -> int:
 @functools.cache
 def build_parser() -> argparse.ArgumentParser:
     """Build the parser with all sub-commands, once: commands leave its defaults as they are."""
-    parser = _Parser(
+    parser = Parser(
         prog=PROGRAM, description="Diffraction of measured height fields, for Mitsuba 3."
     )
     _add_common(parser)
-    parser.set_defaults(debug=False, progress=None, json=None, retired=())
+    parser.set_defaults(debug=False, progress=None, json=None)
     parser.add_argument(
         "--version", action="version", version=f"{PROGRAM} {version('mitsuba_diffraction')}"
     )
@@ -124,6 +140,8 @@ def build_parser() -> argparse.ArgumentParser:
     )
     for command in COMMANDS:
         command.add_to(subparsers)
+    makers = (subparsers.choices[name] for name in ("precompute", "solve"))
+    parser.set_defaults(flags=flags_of(*makers))  # of tables, which messages may want made again
     for subparser in subparsers.choices.values():
         _add_common(subparser.add_argument_group("general"))
     return parser
@@ -155,7 +173,7 @@ def _run(args: argparse.Namespace) -> int:
         note_arguments(args)
         report = [args.json] if args.json not in (None, STDOUT) else []
         check_outputs(report)
-        retired(args.retired)
+        retired(sorted(args.given))
         args.began, args.code = time.perf_counter(), DONE
         figures = args.run(args)
         for file in report if figures else []:

@@ -26,7 +26,7 @@ from ..settings import TableSettings
 from ..tables import DiffractionTable, TableSource
 from ..tables.source import loaded_table
 from . import options
-from .brdf_map import surface_parameters
+from .brdf_map import OF_ORDERS, surface_parameters
 from .console import Bar, say
 
 
@@ -75,19 +75,15 @@ class Measurement:
     def _of_table(self, table: Any, file: Path) -> Spectra:
         """Measure the spectra of a table."""
         args = self.args
+        # a table of heights serves all light above its shortest wavelength
+        heights = isinstance(table, DiffractionTable)
         own = (*options.HEIGHTS, *options.TABLE, "crops", "ext_ior")
-        if refused := options.given(args, own):
-            option = options.option_of(args, next(iter(refused)))
-            raise DiffractionError(
-                f"'{file}' is a table, which has its own; leave {option} out, or give heights"
-            )
+        options.refuse_of_table(args, file, own if heights else (*own, *OF_ORDERS))
         if args.light_azimuth == "auto":
             raise DiffractionError(
                 f"'{file}' is a table, without heights to find gratings in; give --azimuth in "
                 "degrees"
             )
-        # a table of heights serves all light above its shortest wavelength
-        heights = isinstance(table, DiffractionTable)
         low, high = (table.wavelength_range[0], math.inf) if heights else table.wavelengths
         lam = self._within(low, high, file)
         return self._spectrum(table, self.geometry, lam)

@@ -35,6 +35,9 @@ def eye_of(args: argparse.Namespace) -> Eye | None:
         return None
     if args.frames is not None or args.plan is not None or args.denoise or args.workers:
         args.parser.error("argument --observer: is for one picture in one process, without a plan")
+    options.refuse(
+        args, ["view"], ": has no effect on the false colours of --observer; leave it out"
+    )
     if args.output is not None and args.output.suffix.lower() != ".exr":
         args.parser.error(f"argument -o: --observer writes an EXR, not {str(args.output)!r}")
     return observers.eye_of(args.observer)

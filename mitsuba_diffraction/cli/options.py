@@ -19,6 +19,7 @@ from ..heights.coherence import resolved
 from ..heights.read import OPTIONS
 from ..heights.source import notes_line
 from ..optics.display import VIEWS
+from ..retired import REPLACED
 from ..settings import SETTINGS, TableSettings, checked
 from ..tables.build.checks import check_units, check_window, period_of, warnings_of
 from ..thesis.methods import NAMES
@@ -26,9 +27,6 @@ from .report import Figures
 
 #: The values that `add_option` takes after the group.
 Row = tuple[Any, ...]
-
-#: Default of --wavelength-range and of --step, nm.
-WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
 
 #: Numbers of an option that accepts ranges, at most.
 _MOST_NUMBERS = 10_000
@@ -53,6 +51,16 @@ TABLE = (
 #: The settings of a table that the evaluators of the thesis take.
 TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
 
+
+# Options that a method of the thesis does not use.
+_UNUSED: dict[str, tuple[str, ...]] = {
+    "spectral": ("period", "terms"), "flss": ("period",), "nmm": (),
+    "pq": ("period", "coherence"), "pq-sinc": ("period", "coherence"),
+    "rainbow": ("coherence", "tolerance", "terms", "step"),
+}  # fmt: skip
+
+# Names that every command has.
+_GENERAL = ("command", "json", "debug", "progress")
 
 #: A patch, which `load_patch` reads.
 SOURCE = ("SOURCE", "heights of any format, or a recipe (.toml)", Path)
@@ -92,9 +100,10 @@ def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
     return path
 
 
-def whole_number(least: int) -> Callable[[str], int]:
+def whole_number(least: int, most: int = 2**31 - 1) -> Callable[[str], int]:
     """Return a type of argument: a whole number of at least `least` that fits 31 bits."""
-    return _number(int, least, 2**31 - 1, f"a whole number from {least}")
+    end = f" to {most}" if most < 2**31 - 1 else ""
+    return _number(int, least, most, f"a whole number from {least}{end}")
 
 
 def number_between(low: float, high: float) -> Callable[[str], float]:
@@ -121,7 +130,7 @@ STOPS = number_between(-100, 100)
 def numbers(text: str) -> tuple[float, ...]:
     """Type of argument: values and FIRST:LAST:STEP, joined by commas."""
     try:
-        return tuple(n for part in text.split(",") for n in numbers_of(part, _MOST_NUMBERS))
+        return tuple(n for part in text.split(",") for n in _range_of(part))
     except ValueError as error:
         raise argparse.ArgumentTypeError(
             "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
@@ -137,12 +146,12 @@ def limits(text: str) -> tuple[float, float]:
     raise argparse.ArgumentTypeError(f"expected FIRST:LAST, such as 400:700, got {quoted(text)}")
 
 
-def numbers_of(text: str, most: int) -> list[float]:
-    """Return a number, or at most so many from FIRST to LAST by STEP; else raise a ValueError."""
+def _range_of(text: str) -> list[float]:
+    """Return a number, or numbers from FIRST to LAST by STEP; else raise a ValueError."""
     if ":" not in text:
         return [float(text)]
     first, last, step = (float(part) for part in text.split(":"))
-    if not (step > 0.0 and last >= first and (last - first) / step < most):
+    if not (step > 0.0 and last >= first and (last - first) / step < _MOST_NUMBERS):
         raise ValueError(text)
     return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
 
@@ -227,25 +236,14 @@ def add_option(
     group.add_argument(*names, **{**how, **more})
 
 
-class _Retired(argparse.Action):
-    """Option of an earlier version, whose name is kept for the line about it."""
-
-    def __call__(
-        self, parser: Any, namespace: argparse.Namespace, values: Any, option: Any = None
-    ) -> None:
-        namespace.retired = (*getattr(namespace, "retired", ()), self.dest)
-
-
-def retired_row(name: str, count: int) -> Row:
-    """Return the row of an option of an earlier version, with so many values; see `retired`."""
-    more = {"action": _Retired, "nargs": count, "default": argparse.SUPPRESS}
-    return _option(name), argparse.SUPPRESS, None, None, more
+def retired_row(name: str, kind: type | None = None) -> Row:
+    """Return the row of an option of an earlier version, which `retired` names; bool of a flag."""
+    return _option(name), argparse.SUPPRESS, kind
 
 
 def given(args: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
-    """Return the values of options without defaults that are on the command line, by name."""
-    values = {name: getattr(args, name, None) for name in names}
-    return {k: v for k, v in values.items() if v is not None and v is not False and v != []}
+    """Return the values of options that are on the command line, by name."""
+    return {name: getattr(args, name) for name in names if name in args.given}
 
 
 def option_of(args: argparse.Namespace, name: str) -> str:
@@ -254,15 +252,33 @@ def option_of(args: argparse.Namespace, name: str) -> str:
     return str(action.option_strings[-1] if action.option_strings else action.metavar)
 
 
-def refuse(
-    args: argparse.Namespace, names: Iterable[str], why: str, before: str = "argument "
-) -> None:
+def flags_of(*parsers: argparse.ArgumentParser) -> dict[str, str]:
+    """Return the options of parsers by the names of their values; later parsers precede."""
+    actions = (action for parser in parsers for action in parser._actions)
+    return {each.dest: each.option_strings[-1] for each in actions if each.option_strings}
+
+
+def refuse(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
     """Refuse the first of the options that is on the command line, with a usage error.
 
-    why, before : the message after and before the option.
+    why : the message after the option.
     """
     for name in given(args, names):
-        args.parser.error(f"{before}{option_of(args, name)}{why}")
+        args.parser.error(f"argument {option_of(args, name)}{why}")
+
+
+def refuse_others(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
+    """Refuse the first option or argument beside these and the general ones, as `refuse` does."""
+    refuse(args, sorted(args.given - {*_GENERAL, *REPLACED, *names}), why)
+
+
+def refuse_of_table(args: argparse.Namespace, file: Path, names: Iterable[str]) -> None:
+    """Refuse the first option whose value a table has in itself, with a DiffractionError."""
+    for name in given(args, names):
+        raise DiffractionError(
+            f"'{file}' is a table, which has its own; leave {option_of(args, name)} out, or give "
+            "heights"
+        )
 
 
 def heights() -> Group:
@@ -323,20 +339,26 @@ def direction(theta: float = 0.0, phi: float | None = 0.0) -> tuple[Row, Row]:
 #: Limits of the spectrum and its step, nm; see `wavelengths`.
 SPECTRUM = (
     *table(("wavelength_range",)),
-    ("--step NM", f"between wavelengths; default: {STEP:g}", float),
+    ("--step NM", "between wavelengths", float, 5.0),
 )
 
 
 def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments `wavelength_range` and `step`, nm."""
-    step = STEP if args.step is None else args.step
-    return {"wavelength_range": tuple(args.wavelength_range or WAVELENGTH_RANGE), "step": step}
+    span = tuple(args.wavelength_range or TableSettings.wavelength_range)
+    return {"wavelength_range": span, "step": args.step}
 
 
 def method(default: str | None, text: str) -> tuple[Row, Row]:
     """Return the rows of the method that sums the spectrum, and of the period that some need."""
     period = "µm, for the methods that need one; default: estimated from the heights"
     return ("--method", text, NAMES, default), ("--period D", period, float)
+
+
+def refuse_unused(args: argparse.Namespace, used: Iterable[str] = ()) -> None:
+    """Refuse options that have no effect with --method, but for those that the command uses."""
+    names = [name for name in _UNUSED[args.method] if name not in used]
+    refuse(args, names, f": has no effect with --method {args.method}; leave it out")
 
 
 def samples(least: int, default: int | None) -> tuple[Row, Row]:

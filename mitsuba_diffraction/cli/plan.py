@@ -27,13 +27,12 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, lines_of
 
-PATHS, TOLERANCE = 1 << 17, 1e-3
-_MOST_PATHS = 1 << 22  # lanes are counted in single precision
 #: How a plan is made.
 PLAN = (
-    ("--paths N", "paths to trace for a plan", whole_number(2), PATHS),
+    # lanes are counted in single precision
+    ("--paths N", "paths to trace for a plan", whole_number(2, 1 << 22), 1 << 17),
     ("--plan-tolerance SHARE", "share of a surface's light that a plan may leave out",
-     number_between(1e-5, 0.1), TOLERANCE),
+     number_between(1e-5, 0.1), 1e-3),
 )  # fmt: skip
 
 
@@ -77,8 +76,6 @@ def run(args: argparse.Namespace) -> Figures:
     parameters = scene_options.scene_parameters(args)
     if args.output is not None:
         check_outputs([args.output])
-    if args.paths > _MOST_PATHS:
-        args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
     variant = planning_variant(args.mode)
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
@@ -151,8 +148,11 @@ def load_by_plan(
 
 
 def check_plan_options(args: argparse.Namespace) -> None:
-    """Refuse options of a plan without one; a usage error."""
-    for name, default in (("paths", PATHS), ("plan_tolerance", TOLERANCE)):
-        if args.plan is None and getattr(args, name) != default:
-            option = options.option_of(args, name)
-            args.parser.error(f"argument {option}: is for --plan, which is missing")
+    """Refuse options of a plan that is not made; a usage error."""
+    made = ("paths", "plan_tolerance")
+    if args.plan is None:
+        options.refuse(args, made, ": is for --plan, which is missing")
+    elif args.plan:
+        options.refuse(
+            args, made, ": has no effect on the recipes of --plan; leave one of both out"
+        )

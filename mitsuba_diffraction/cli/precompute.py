@@ -20,7 +20,7 @@ from ..tables.build.build import build_with
 from ..tables.build.checks import warnings_of
 from . import options
 from .console import Bar
-from .report import Figures, check_outputs, output_name
+from .report import Figures, check_outputs, output_of
 from .workers import WORKERS, client_of, on_workers
 
 
@@ -36,7 +36,7 @@ from .workers import WORKERS, client_of, on_workers
     options.heights(),
     options.Group("the table", (
         *options.table(), *options.table(("wavelength_range",)),
-        options.retired_row("second_order", 1),
+        options.retired_row("second_order"),
     )),
     WORKERS,
     options.json("the table's summary"),
@@ -58,15 +58,14 @@ def run(args: argparse.Namespace) -> Figures:
 
 def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]:
     """Build one table and return its summary; the folder of a recipe's output may be made."""
-    recipe, output = source.recipe, args.output
-    make_folder = recipe is not None and output is None
-    if recipe is None:
-        output = output_name(output, Path(f"{source.files[0].stem}.exr"))
-    else:
-        output = output or recipe.output
     start = time.perf_counter()
     settings = source.settings_for(options.table_options(args))
-    check_outputs([output], make_folder=make_folder)
+    make_folder = source.recipe is not None and args.output is None
+    if source.recipe is None:
+        output = output_of(args, Path(f"{source.files[0].stem}.exr"))
+    else:
+        output = args.output or source.recipe.output
+        check_outputs([output], make_folder=make_folder)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = source.fields()

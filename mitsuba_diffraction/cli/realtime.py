@@ -21,7 +21,7 @@ from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import path_ending_in, whole_number
-from .report import Figures, check_outputs, elapsed, output_name, plain, save_json
+from .report import Figures, check_outputs, elapsed, output_of, plain, save_json
 
 _EXPORTED = ("fast", "exact")
 
@@ -97,8 +97,7 @@ def compare(args: argparse.Namespace) -> Figures:
     def files_in(folder: Path) -> list[Path]:
         return [folder / "compare.json", *folder.glob("*.exr"), *folder.glob("*.png")]
 
-    folder = output_name(args.output, Path(f"{args.name.stem}_compare"), files_in)
-    check_outputs(files_in(folder)[:1], make_folder=True)
+    folder = output_of(args, Path(f"{args.name.stem}_compare"), files_in, make_folder=True)
 
     from ..realtime.shader_comparison.report import markdown
     from ..realtime.shader_comparison.run import Comparison
@@ -136,7 +135,7 @@ def compare(args: argparse.Namespace) -> Figures:
 def export_viewer(args: argparse.Namespace) -> Figures:
     """Export, and return the figures."""
     scene_options.put_on_stage(args)
-    args.output = output_name(args.output, Path(f"{args.name.stem}.html"), lambda page: [page])
+    args.output = output_of(args, Path(f"{args.name.stem}.html"))
     return _write_page(args, WEB_METHODS if args.method == "all" else (args.method,), args.title)
 
 
@@ -194,8 +193,7 @@ def export_shader(args: argparse.Namespace) -> Figures:
     def files_in(folder: Path) -> list[Path]:
         return [folder / "constants.json", folder / "diffraction.glsl", *folder.glob("*.exr")]
 
-    folder = output_name(args.output, Path(f"{args.source.stem}-shader"), files_in)
-    check_outputs(files_in(folder)[:2], make_folder=True)
+    folder = output_of(args, Path(f"{args.source.stem}-shader"), files_in, make_folder=True)
 
     from ..realtime.glsl.export import export_shader
 

@@ -38,7 +38,7 @@ from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupt import INTERRUPTED, keep_in_mind
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
-from .report import Figures, check_outputs, elapsed, exr_and_png, output_name, output_of
+from .report import Figures, check_outputs, elapsed, exr_and_png, output_of
 from .studio import STUDIO_OPTIONS, take_studio
 from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
 
@@ -75,24 +75,18 @@ def run(args: argparse.Namespace) -> Figures:
     take_studio(args)
     scene_options.put_on_stage(args)
     eye = eye_of(args)
-    if on_workers(args) and args.plan is not None:
-        args.parser.error("argument --plan: is for one process; leave the workers out")
+    if on_workers(args):
+        options.refuse(args, ("plan", "denoise"), ": is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
     if args.denoise:
-        if on_workers(args):
-            args.parser.error("argument --denoise: is for one process; leave the workers out")
         optional("pyoidn")
     if args.frames is not None:
         if not moving:
             args.parser.error("argument --frames: say what changes, with --animate or --turn")
-        if args.plan is not None:
-            args.parser.error(
-                "argument --plan: is for one picture; with --frames, camera and light may leave it"
-            )
-        args.fps = args.fps or 24.0
+        why = ": is for one picture; with --frames, camera and light may leave it"
+        options.refuse(args, ["plan"], why)
         return _run_frames(args)
-    if moving or args.exr or args.fps:
-        args.parser.error("--animate, --turn, --exr and --fps belong to --frames: say how many")
+    options.refuse(args, ("animate", "turn", "exr", "fps"), ": belongs to --frames; say how many")
     if eye is None and on_workers(args):
         return _on_workers(args)
     return _run_one(args, eye)
@@ -228,7 +222,8 @@ def _check_colours(args: argparse.Namespace, output: Path, scene: Any, sensor: A
 def _run_frames(args: argparse.Namespace) -> Figures:
     """Render the frames that are missing or outdated, then the film; return the figures."""
     folder, film = _folder_and_film(args)
-    check_outputs(_files_of_frames(args, folder), make_folder=True)
+    if film is None:
+        options.refuse(args, ["fps"], ": is for a film; name one, e.g. -o NAME.mp4")
     if film is not None:
         check_film(film)
         check_outputs([film])
@@ -293,7 +288,7 @@ def _frames_on_workers(
 def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
     """Return the folder of the frames, and the film, if there is one."""
     default = Path(f"{args.name.stem}_frames")
-    output = output_name(args.output, default, partial(_files_of_frames, args))
+    output = output_of(args, default, partial(_files_of_frames, args), make_folder=True)
     if output.suffix.lower() in FILMS:
         return output.with_suffix(""), output
     if output.suffix:
@@ -305,7 +300,9 @@ def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
 
 
 def _files_of_frames(args: argparse.Namespace, folder: Path) -> list[Path]:
-    """Return the files of the frames in a folder."""
+    """Return the files of the frames in a folder, or of a film's."""
+    if folder.suffix.lower() in FILMS:
+        folder = folder.with_suffix("")
     suffixes = (".png", ".exr") if args.exr else (".png",)
     return [folder / f"frame_{n:04d}{s}" for n in range(args.frames) for s in suffixes]
 

@@ -162,18 +162,8 @@ def _check_folder(path: Path, make_folder: bool) -> None:
         ) from error
 
 
-def output_name(
-    given: Path | None, default: Path, files: Callable[[Path], Iterable[Path]] = lambda path: [path]
-) -> Path:
-    """Return the output that is given, or else the default name.
-
-    A default name that would replace a file that the command reads gets a number, in one line on
-    stderr; a given one is refused by `check_outputs`.
-
-    files : returns all files that an output of this name has.
-    """
-    if given is not None:
-        return given
+def _free_name(default: Path, files: Callable[[Path], Iterable[Path]]) -> Path:
+    """Return the default name, with a number if it would replace a file that the command reads."""
     names = (default.with_name(f"{default.stem}-{n}{default.suffix}") for n in itertools.count(2))
     read: list[str] = []
     for name in itertools.chain([default], names):
@@ -190,11 +180,14 @@ def output_of(
     args: argparse.Namespace, default: Path,
     files: Callable[[Path], Iterable[Path]] = lambda path: [path], *, make_folder: bool = False,
 ) -> Path:  # fmt: skip
-    """Return the output of -o, or its default name, after the checks of all its files.
+    """Return the output of -o, or its default name, after `check_outputs` of all its files.
 
-    For the parameters see `output_name` and `check_outputs`.
+    A default name that would replace a file that the command reads gets a number, in one line on
+    stderr.
+
+    files : returns all files that an output of this name has.
     """
-    output = output_name(args.output, default, files)
+    output: Path = args.output or _free_name(default, files)
     check_outputs(files(output), make_folder=make_folder)
     return output
 

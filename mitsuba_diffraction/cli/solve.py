@@ -15,7 +15,7 @@ from ..heights.read import read_heights
 from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
-from .report import Figures, check_outputs, output_name
+from .report import Figures, check_outputs, output_of
 from .workers import WORKERS, executor_for
 
 if TYPE_CHECKING:
@@ -24,21 +24,14 @@ if TYPE_CHECKING:
     from ..orders.solve.recipes import SolvedRecipe
     from ..orders.solve.settings import Estimate
 
-#: Options that an imported file does not have.
-_SOLVED_ONLY = (
-    "depth", "duty", "direction", "material", "layers", "beneath", "substrate", "thin", "block",
-    "wavelength_range", "tolerance", "solver", "resolution", "polarised", "theta", "phi", "step",
-    "jobs", "workers", "scheduler", "crossed",
-)  # fmt: skip
+#: Options of an imported file.
+_IMPORTED = ("source", "output", "period", "period_y", "superstrate", "imports")
 #: Options that override fields of a recipe.
 _OF_A_RECIPE = (
     "material", "superstrate", "thin", "block", "output", "substrate", "layers", "beneath",
 )  # fmt: skip
-#: Options that override settings of a recipe, and the names of these.
-_SETTINGS = {
-    "wavelength_range": "wavelengths", "tolerance": "tolerance", "solver": "method",
-    "resolution": "resolution", "polarised": "polarised",
-}  # fmt: skip
+#: Options that override settings of a recipe.
+_SETTINGS = ("wavelengths", "tolerance", "method", "resolution", "polarised")
 
 
 def _layer(text: str) -> Layers:
@@ -95,12 +88,13 @@ def _layer(text: str) -> Layers:
          "from within; needs an index as material; solved by coupled waves", bool),
     )),
     options.Group("the table", (
-        ("--wavelength-range FIRST:LAST", "nm; default: 380:780", options.limits),
+        ("--wavelength-range FIRST:LAST", "nm; default: 380:780", options.limits, None,
+         {"dest": "wavelengths"}),
         ("--tolerance E", "mean error between nodes, of the light in all orders but 0; 95 %% of "
          "directions keep 4 times as much; default: 0.01", number_between(1e-4, 0.2)),
         ("--solver", "Chandezon's method, for slopes; boundary integral (extra solve); coupled "
          "waves, for dielectrics; default: auto, the first that suits",
-         ("auto", "chandezon", "integral", "coupled")),
+         ("auto", "chandezon", "integral", "coupled"), None, {"dest": "method"}),
         ("--resolution N", "points on the boundary, or harmonics; default: chosen by convergence",
          whole_number(3)),
         ("--polarised", "with Mueller matrices, for polarised variants; about 20 times as large",
@@ -117,7 +111,7 @@ def _layer(text: str) -> Layers:
          "or more; order_x, order_y for order make a crossed grating; needs --period", bool, None,
          {"dest": "imports"}),
     )),
-    options.retired_row("accept", 0),
+    options.retired_row("accept", bool),
     ("--jobs N", "processes here; default: 1", whole_number(1)),
     WORKERS,
     options.json("the table's summary"),
@@ -131,14 +125,13 @@ def run(args: argparse.Namespace) -> Figures:
     from ..orders.solve.accuracy import missed_tolerance
 
     source = Path(args.source)
-    output = output_name(args.output, Path(f"{source.stem}.nc"))
     if args.imports:
         from ..orders.imported import read_orders
 
         if args.period is None:
             args.parser.error("argument --import: needs --period, µm")
-        options.refuse(args, _SOLVED_ONLY, ": is for a solution; --import has efficiencies")
-        check_outputs([output])
+        options.refuse_others(args, _IMPORTED, ": is for a solution; --import has efficiencies")
+        output = output_of(args, Path(f"{source.stem}.nc"))
         period = (args.period, args.period_y) if args.period_y else args.period
         table: OrderTable = read_orders(source, period, superstrate=args.superstrate or 1.0)
     else:
@@ -187,7 +180,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     for name in ("layers", "beneath"):
         if name in changed:
             changed[name] = tuple(itertools.chain(*changed[name]))
-    settings = {_SETTINGS[name]: v for name, v in options.given(args, _SETTINGS).items()}
+    settings = options.given(args, _SETTINGS)
     return replace(recipe, settings=replace(recipe.settings, **settings), **changed)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from ..analysis.spectrometer import MeasurementGeometry, column_name
 from ..errors import DiffractionError, counted
 from ..images import save_figure
 from ..scene.load import set_variant
+from ..text_spectra import read_shares
 from . import options
 from .brdf_map import surface_options, surface_parameters
 from .console import Bar, mitsuba_warnings, say
@@ -88,6 +89,8 @@ _SPECTROMETER = (
      number_between(1e-4, 1e2)),
     ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
      "2019)", bool),
+    ("--measured FILE[:COLUMN]", "measured reflectance to draw beside the curve of one detector, "
+     "with the RMS difference: text of wavelengths (nm) and fractions or per cent of white"),
     ("-o --output OUT", "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in "
      "the current folder", options.path_ending_in(".csv")),
     options.Group("the spectrometer", _SPECTROMETER),
@@ -104,16 +107,16 @@ def run(args: argparse.Namespace) -> Figures:
     first = next(iter(groups))
     repeated = args.crops is not None or any(len(members) > 1 for members in groups.values())
     default = Path(f"{first or files[0].stem}-spectrum.csv")
-    output = output_of(args, default, partial(_files, args, repeated))
-    written = _files(args, False, output)
-    errors, angular = _beside(output, "errors"), _beside(output, "iridescence")
+    output = output_of(args, default, lambda name: _files(args, repeated, name).values())
+    files_of = _files(args, repeated, output)
     lam = _wavelengths(args)
     eye, light = _eye(args, lam)
+    detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
     from ..analysis import spectra_files as files_of_spectra
 
-    detectors = (args.light,) if args.detector is None else tuple(chain(*args.detector))
+    measured = _measured_curve(args, detectors, lam)
     auto = args.light_azimuth == "auto"
     geometry = MeasurementGeometry(
         args.light, tuple(dict.fromkeys(detectors)), 0.0 if auto else args.light_azimuth,
@@ -123,38 +126,47 @@ def run(args: argparse.Namespace) -> Figures:
     lam = _known_wavelengths(args, lam)  # before a table is built
     with mitsuba_warnings(), Bar(args) as bar:
         measurement = Measurement(args, geometry, lam, bar)
-        measured = _measured(measurement, groups)
-    if any(len(groups[name]) > len(kept) for name, (kept, _) in measured.items()):
+        computed = _measured(measurement, groups)
+    if any(len(groups[name]) > len(kept) for name, (kept, _) in computed.items()):
         args.code = 1
-    groups = {name: kept for name, (kept, _) in measured.items()}
+    groups = {name: kept for name, (kept, _) in computed.items()}
     files = [file for members in groups.values() for file in members]
     measurement.say_notes()
     everything = files_of_spectra.on_common_wavelengths(
-        {name: parts for name, (_, parts) in measured.items()}
+        {name: parts for name, (_, parts) in computed.items()}
     )
     if len(files) > 1 and everything[first][0].wavelength.size < lam.size:
         common = everything[first][0].wavelength
         say(f"columns are from {common[0]:g} to {common[-1]:g} nm, which every table has")
     spectra = {name: mean_spectra(parts) for name, parts in everything.items()}
+    if all(each.error is None for each in spectra.values()):
+        files_of.pop("errors", None)
+    else:
+        files_of_spectra.save_errors(spectra, files_of["errors"])
     files_of_spectra.save_csv(spectra, output)
-    if any(each.error is not None for each in spectra.values()):
-        written.append(errors)
-        files_of_spectra.save_errors(spectra, errors)
-    files_of_spectra.save_colours(spectra, written[2])
+    files_of_spectra.save_colours(spectra, files_of["colours"])
     if eye is not None:
-        files_of_spectra.save_catches(spectra, eye, light, *written[3:5])
+        files_of_spectra.save_catches(spectra, eye, light, *(files_of[name] for name in _SEEN))
     if args.iridescence:
-        files_of_spectra.save_angular(spectra, angular)
+        files_of_spectra.save_angular(spectra, files_of["iridescence"])
     title, turned = _title(groups, args), files_of_spectra.EACH if auto and repeated else ""
-    save_figure(written[1], files_of_spectra.spectra_figure(spectra, title, turned))
     shown = spectra[first]
     lam = shown.wavelength
+    beside = {} if measured is None else _compared(args, *measured, lam, shown.value[:, 0])
+    figure = files_of_spectra.spectra_figure(spectra, title, turned, measured)
+    save_figure(files_of["plot"], figure)
+    written = list(files_of.values())
     print(
         f"{' and '.join(map(str, written))}: "
         f"{counted(len(shown.geometry.detectors), 'spectrum', 'spectra')} of "
         f"{counted(lam.size, 'wavelength')}, {lam[0]:g} to {lam[-1]:g} nm, {title}, "
         f"{elapsed(args):.1f} s, {variant}"
     )
+    if beside:
+        print(
+            f"  {args.measured}: RMS difference {100.0 * beside['rms']:.3g} %, mean of the "
+            f"measured {100.0 * beside['mean']:.3g} %, {beside['first']:g} to {beside['last']:g} nm"
+        )
     for name, each in spectra.items():
         if 100.0 * each.value.max() < _NOTHING:
             say(
@@ -169,9 +181,43 @@ def run(args: argparse.Namespace) -> Figures:
     return {"files": written, "sources": files, "light": args.light,
             "light_azimuth": turned or shown.geometry.azimuth,
             "detectors": shown.geometry.detectors,
-            "acceptance": args.acceptance, "relative": args.relative,
+            "acceptance": args.acceptance, "relative": args.relative, "measured": beside,
             # the CSV has per cent
             "wavelengths": lam.tolist(), "unit": "1", "spectra": columns}  # fmt: skip
+
+
+def _measured_curve(
+    args: argparse.Namespace, detectors: Sequence[float], lam: Any
+) -> tuple[Any, Any] | None:
+    """Return wavelengths (n,) in nm and values (n,) of --measured, or None.
+
+    Raises a DiffractionError if the file is no reflectance, or has other wavelengths.
+    """
+    if args.measured is None:
+        return None
+    if args.groups or len(detectors) > 1 or args.relative != "white":
+        args.parser.error(
+            "argument --measured: is compared with one curve, in per cent of white; give one "
+            "--detector, and neither --group nor --relative"
+        )
+    measured = read_shares(args.measured, "reflectances", (lam[0], lam[-1]))
+    _compared(args, *measured, lam, 0.0 * lam)
+    return measured
+
+
+def _compared(
+    args: argparse.Namespace, nodes: Any, values: Any, lam: Any, computed: Any
+) -> dict[str, Any]:
+    """Return the RMS difference of a measured and a computed curve where both are known."""
+    both = (lam >= nodes[0]) & (lam <= nodes[-1])
+    if not both.any():
+        raise DiffractionError(
+            f"'{args.measured}' has {nodes[0]:g} to {nodes[-1]:g} nm, and the spectrum {lam[0]:g} "
+            f"to {lam[-1]:g} nm; give others by --wavelength-range"
+        )
+    known = np.interp(lam[both], nodes, values)
+    return {"file": args.measured, "rms": float(np.sqrt(np.mean((computed[both] - known) ** 2))),
+            "mean": float(known.mean()), "first": lam[both][0], "last": lam[both][-1]}  # fmt: skip
 
 
 def _measured(
@@ -199,17 +245,14 @@ def _measured(
     return measured
 
 
-def _files(args: argparse.Namespace, repeated: bool, output: Path) -> list[Path]:
-    """Return the files of -o, with standard errors of `repeated` scans."""
+def _files(args: argparse.Namespace, repeated: bool, output: Path) -> dict[str, Path]:
+    """Return the files of -o by content, with standard errors of `repeated` scans."""
     names = [
         "colours", *(_SEEN if args.observer is not None else ()),
         *(["iridescence"] if args.iridescence else []), *(["errors"] if repeated else []),
     ]  # fmt: skip
-    return [output, output.with_suffix(".png"), *(_beside(output, name) for name in names)]
-
-
-def _beside(output: Path, name: str) -> Path:
-    return output.with_name(f"{output.stem}-{name}.csv")
+    tables = {name: output.with_name(f"{output.stem}-{name}.csv") for name in names}
+    return {"spectra": output, "plot": output.with_suffix(".png"), **tables}
 
 
 def _eye(args: argparse.Namespace, lam: Any) -> tuple[Any, Any]:

@@ -49,7 +49,7 @@ _SIZES = 1.5
     options.MODE,
     options.Group("the surface, of maps and numbers", MATERIAL),
     options.heights(),
-    options.Group("the tables", (*options.table(), options.retired_row("second_order", 1))),
+    options.Group("the tables", (*options.table(), options.retired_row("second_order"))),
     WORKERS,
     THREADS,
     options.json("the rows"),

@@ -21,6 +21,11 @@ from .brdf_map import RELATIVE, gain_of
 from .console import Bar
 from .report import Figures, beside, elapsed, output_of
 
+# Option of each sweep's own quantity.
+_SWEPT = {
+    "wavelength-step": "step", "coherence-width": "coherence_width", "terms": "terms",
+    "light-angle": "theta", "method": "method",
+}  # fmt: skip
 _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_exposure", "blueness")
 
 
@@ -53,6 +58,11 @@ _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_expos
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Evaluate all maps, compare, draw, and return the figures."""
+    swept = f": has no effect on a sweep over {args.kind}; give its values by --values"
+    options.refuse(args, [_SWEPT[args.kind]], swept)
+    if args.kind != "method":
+        options.refuse(args, ["compiled"], ": is for a sweep over methods; leave it out")
+        options.refuse_unused(args)
     files = beside(".csv")
     output, numbers = files(output_of(args, Path(f"{args.source.stem}-{args.kind}.png"), files))
     light, values, gain = LightDirection(args.theta, args.phi), _values(args), gain_of(args)

@@ -40,6 +40,9 @@ _NAMED = 6  # singular points that are named
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
     """Write the mesh, say where its field is singular, and return the figures."""
+    if args.along == "smooth":
+        no_guide = ": has no effect without a guide; add --along x, y, z or body"
+        options.refuse(args, ["smoothing"], no_guide)
     check_outputs([args.output])
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.mesh_files import load_mesh, write_ply

@@ -58,7 +58,7 @@ FULL, QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
 def run(args: argparse.Namespace) -> Figures:
     """Measure, write and recommend, and return the figures."""
     if args.heights is None:
-        options.refuse(args, options.HEIGHTS, " needs a file of heights", before="")
+        options.refuse(args, options.HEIGHTS, ": needs a file of HEIGHTS; name one")
     args.output = output_of(args, Path("tradeoff"), _files_in, make_folder=True)
     side, pairs, lanes, rounds, depths = QUICK if args.quick else FULL
     if args.heights is None:

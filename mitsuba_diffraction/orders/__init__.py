@@ -39,7 +39,7 @@ from .table import OrderTable
 
 __all__ = [
     "Band", "CellResponse", "ListedResponse", "OrderTable", "cells", "daylight", "file", "imported",
-    "listing", "lookup", "lookup_in", "rows",
+    "listed", "listing", "lookup", "lookup_in", "rows",
 ]  # fmt: skip
 
 # Modules that build on the class; it shall not import them

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from ..arrays import Real
 from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
-from .listed import Lights, canonical, listed_response, listed_table, mirror_of, warn_of_gaps
+from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
 from .polarised import MIN_ANGLE, turned_axes
-from .response import LARGEST_SUM, ListedResponse, orders_between
+from .response import LARGEST_SUM, ListedResponse, canonical, orders_between
 from .table import OrderTable, check_outline
 from .table_error import table_error
 

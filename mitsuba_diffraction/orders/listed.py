@@ -11,11 +11,16 @@ from scipy.spatial import KDTree
 from ..arrays import Complex, Real
 from ..errors import warn
 from .polarised import nearest_jones
-from .response import STEEPEST, WIDEST_GAP, ListedResponse, orders_between
+from .response import (
+    DIGITS,
+    STEEPEST,
+    WIDEST_GAP,
+    ListedResponse,
+    canonical,
+    orders_between,
+)
 from .table import OrderTable
 
-#: Decimals of degrees that tell directions apart.
-_DIGITS = 9
 #: Differences of directions (twice `polarised.MIN_ANGLE`), and relative ones of wavelengths, within
 #: which light is the listed one.
 _SAME, _SAME_WAVELENGTH = 4e-6, 1e-6
@@ -166,16 +171,6 @@ def listed_jones(table: OrderTable, *light: ArrayLike) -> Complex:
     return entries.reshape(*x.shape, 2, 2)
 
 
-def canonical(theta: ArrayLike, phi: ArrayLike, crossed: bool) -> tuple[Real, Real]:
-    """Return θ (b,) from 0 and φ (c,), (b, c) each: φ to 180° on grooves, below 360° on crossed."""
-    theta, azimuth = np.meshgrid(theta, phi, indexing="ij")
-    turned = (azimuth + np.where(theta < 0.0, 180.0, 0.0)) % 360.0
-    phi = np.asarray(np.round(turned, _DIGITS) % 360.0, np.float64)
-    if not crossed:  # mirror images are alike
-        phi = np.asarray(np.round(np.minimum(phi, 360.0 - phi), _DIGITS), np.float64)
-    return np.asarray(np.round(np.abs(theta), _DIGITS), np.float64), phi
-
-
 def _of_nearest_directions(
     values: Real, known: NDArray[np.bool_], polar: Real, azimuths: Real
 ) -> Real:
@@ -252,7 +247,7 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
     _, polar, azimuths = response.axes
     asked = np.stack(canonical(theta, phi, table.crossed), axis=-1).reshape(-1, 2)
     steep, turned = asked.T
-    near = 10.0**-_DIGITS
+    near = 10.0**-DIGITS
     within = (turned >= azimuths[0] - near) & (turned <= azimuths[-1] + near)
     if table.crossed and len(azimuths) == 3:  # one azimuth
         within = turned == azimuths[1]
@@ -261,9 +256,7 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
     within = (within | (steep == 0.0)) & (steep >= polar[0] - near) & (steep <= polar[-1] + near)
     if within.all():
         return
-    listed = table.header.get("directions")
-    if listed is None:
-        listed = [[t, p] for t in polar for p in azimuths if 0.0 <= p < 360.0]
+    listed = table.directions
     places = [np.concatenate(canonical([t], [p], table.crossed), axis=-1)[0] for t, p in listed]
     nearest = KDTree(_unit(np.array(places))).query(_unit(asked[~within]))[1]
     named = ["theta {:g}°, phi {:g}°".format(*listed[n]) for n in np.unique(nearest)]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Real
 from ..errors import DiffractionError, counted
@@ -23,6 +23,8 @@ MOST_NODES = 64
 #: Largest θ up to which, and widest gap between azimuths of a crossed grating from which on,
 #: degrees, a list lacks directions.
 STEEPEST, WIDEST_GAP = 75.0, 90.0
+#: Decimals of degrees that tell directions apart.
+DIGITS = 9
 #: Numbers of elements of Mueller matrices that a response may have.
 UNPOLARISED, ALONG, LINEAR, MUELLER = 1, 2, 3, 16
 
@@ -249,3 +251,13 @@ def _check_elements(values: NDArray[np.float32], where: str) -> None:
         raise DiffractionError(
             f"{where}: Mueller matrices are not those of the efficiencies; solve the table again"
         )
+
+
+def canonical(theta: ArrayLike, phi: ArrayLike, crossed: bool) -> tuple[Real, Real]:
+    """Return θ (b,) from 0 and φ (c,), (b, c) each: φ to 180° on grooves, below 360° on crossed."""
+    theta, azimuth = np.meshgrid(theta, phi, indexing="ij")
+    turned = (azimuth + np.where(theta < 0.0, 180.0, 0.0)) % 360.0
+    phi = np.asarray(np.round(turned, DIGITS) % 360.0, np.float64)
+    if not crossed:  # mirror images are alike
+        phi = np.asarray(np.round(np.minimum(phi, 360.0 - phi), DIGITS), np.float64)
+    return np.asarray(np.round(np.abs(theta), DIGITS), np.float64), phi

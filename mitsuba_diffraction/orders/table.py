@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ..arrays import Real
 from ..errors import DiffractionError
+from ..optics.orders import crossed_square
 from . import cells
 from .cells import largest_band
-from .response import MUELLER, Band, CellResponse, ListedResponse
+from .response import MUELLER, Band, CellResponse, ListedResponse, canonical
 
 #: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
 WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
@@ -174,10 +175,40 @@ class OrderTable:
 
     @property
     def albedo(self) -> float:
-        """Mean over nodes and ports of the sum over orders of all sides, unpolarised."""
+        """Mean of the sum over orders of all sides, unpolarised.
+
+        Over nodes and ports; of listed light over the listed directions.
+        """
         if isinstance(self.response, ListedResponse):
-            return float(self.response.values[..., 0].sum(axis=-1).mean())
+            return self._listed_albedo(self.response)
         return float(np.mean([kind[..., 0].sum(axis=-1).mean() for kind in self.response.arrays]))
+
+    @property
+    def directions(self) -> list[list[float]]:
+        """θ and φ of listed light, degrees: solved directions, or all of the grid."""
+        assert isinstance(self.response, ListedResponse)
+        _, polar, azimuths = self.response.axes
+        grid = [[float(t), float(p)] for t in polar for p in azimuths if 0.0 <= p < 360.0]
+        return list(self.header.get("directions", grid))
+
+    def _listed_albedo(self, response: ListedResponse) -> float:
+        """Return the mean over the listed lights of the sum over orders that propagate."""
+        lam, theta, phi = response.axes
+        known = np.zeros((len(theta), len(phi)), bool)
+        for t, p in self.directions:
+            steep, turned = (part[0, 0] for part in canonical([t], [p], self.crossed))
+            known[np.abs(theta - steep).argmin(), np.abs(phi - turned).argmin()] = True
+        steps = (1e-3 * lam / (period * self.superstrate) for period in self.periods)
+        shifts = [np.multiply.outer(s, m) for s, m in zip(steps, response.orders.T, strict=True)]
+        polar, azimuth = np.radians(theta)[:, None, None], np.radians(phi)[None, :, None]
+        indices = (self.block or 1.0, 1.0)[: self.sides]  # of a block the first side lies within
+        sums = []
+        for came, index in enumerate(indices):
+            mirror = (-index * np.sin(polar) * part(azimuth) for part in (np.cos, np.sin))
+            along = crossed_square(*mirror, *(shift[:, None, None] for shift in shifts)) - 1.0
+            ports = np.concatenate([along + left**2 > 0.0 for left in indices], axis=-1)
+            sums.append((response.values[:, :, :, came, :, 0] * ports).sum(axis=-1)[:, known])
+        return float(np.mean(sums))
 
     @property
     def nbytes(self) -> int:

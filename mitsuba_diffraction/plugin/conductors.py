@@ -18,10 +18,17 @@ from .parameter_changes import children
 from .types import Texture
 
 Array = NDArray[Any]
+# Suffixes of files of an index, which solvers read.
+_FILES = (".csv", ".txt", ".yml", ".yaml", ".agf")
 
 
 def unknown_conductor(material: str) -> str:
     """Return the message on an unknown conductor, with the names of known ones."""
+    if Path(material.partition(":")[0]).suffix.lower() in _FILES:
+        return (
+            f"material={material!r}: only 'mitsuba-diffraction solve' reads files of an index; "
+            "give its value at one wavelength here, e.g. 1.56 or 3.9+0.02i"
+        )
     names = [*TISSUES, *_names()]
     words = [name.lower() for name in (*names, *METALS)]
     close = difflib.get_close_matches(material.lower(), words, 3, 0.6)

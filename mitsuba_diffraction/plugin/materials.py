@@ -5,6 +5,8 @@ Materials under a film, a coat or a stack (`layers`, `stack`) are materials, too
 
 from __future__ import annotations
 
+import difflib
+import re
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -323,6 +325,13 @@ def _ratio(int_ior: float | str, ext_ior: float | str) -> float:
         probe = mi.load_dict({"type": "dielectric", "int_ior": int_ior, "ext_ior": ext_ior})
     except Exception as error:  # Mitsuba throws RuntimeError, over several lines
         reason = " ".join(str(error).split())
+        if unknown := re.search(r'IOR value for "(.*)"! Valid choices are:(.*)', reason):
+            name, media = unknown.groups()
+            near = difflib.get_close_matches(name.lower(), {*TISSUES, *media.split(", ")}, 2)
+            hint = f"did you mean {' or '.join(near)}? Or" if near else "choose"
+            raise DiffractionError(
+                f"medium {name!r} is unknown; {hint} one of {media}; or give its index, e.g. 1.33"
+            ) from error
         raise DiffractionError(
             f"int_ior={int_ior!r}, ext_ior={ext_ior!r} is not a material that Mitsuba knows "
             f"({reason[:200]}); give a number, a name from Mitsuba's table of materials, or eta "

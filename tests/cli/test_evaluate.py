@@ -114,3 +114,14 @@ def test_the_light_comes_across_the_grooves_and_steep_slopes_are_counted(run, tm
 def test_a_given_period_is_compared_with(run, heights):
     ran = run("evaluate", heights, *EXACT, *QUICK, "--period", "3", "-o", "a.png").succeeded()
     assert "given     3000 nm, the ridge is within 0." in ran.out
+
+
+def test_order_2_is_not_sought_in_the_light_of_order_1(run, here):
+    """Order 1 sends many times as much light within the default angles."""
+    wave = np.tile(0.15 * np.sin(2.0 * np.pi * np.arange(75) * 0.08 / 3.0), (75, 1))
+    np.save(here / "grating.npy", wave)
+    ran = run("evaluate", "grating.npy", *EXACT, *QUICK, "--order", "2").succeeded()
+    with np.load("grating-evaluation.npz") as saved:
+        assert float(saved["fitted_period"]) == pytest.approx(3.0, rel=0.02)
+        assert float(saved["thesis_period"]) == pytest.approx(3.0, rel=0.05)
+    assert "3 µm" in ran.out

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import webbrowser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -80,7 +81,7 @@ def test_a_material_for_blender_is_written_with_all_that_it_reads(run, orders):
 def test_a_bad_name_is_refused_before_anything_is_made(run, orders):
     for name in ("a b", "while", "mix"):
         line = run("export-osl", orders, "-o", "out", "--name", name).failed_in_one_line()
-        assert "name=" in line
+        assert "--name " in line
     assert not Path("out").exists()
 
 
@@ -168,3 +169,9 @@ def test_a_label_lies_on_the_front_of_a_mesh(run, logo):
     run("hologram", logo, "--mesh", "board.obj", "--up", "z", "-o", "a/b").succeeded()
     assert 'type="fitted_mesh"' in Path("a/b/label.xml").read_text()
     assert Path("a/b/board.obj").read_bytes() == Path("board.obj").read_bytes()
+
+
+def test_the_command_that_renders_a_hologram_can_be_typed(run, logo):
+    ran = run("hologram", logo, "--dots", "64", "-o", "my card").succeeded()
+    words = shlex.split(ran.out.splitlines()[-1].partition("mitsuba-diffraction ")[2])
+    assert words == ["render", str(Path("my card", "label.xml")), "--denoise"]

@@ -26,6 +26,12 @@ def test_a_height_field_is_described(run, heights):
         assert part in ran.out
 
 
+def test_warnings_name_the_options_of_the_command(run, heights, here):
+    np.save("tilted.npy", np.load(heights) + 0.003 * np.arange(75))
+    ran = run("info", "tilted.npy", "--pixel-size", "0.08", "--level", "none").succeeded()
+    assert "tilted.npy: use --level plane: " in ran.out
+
+
 def test_pixels_and_extent_are_along_x_and_y(run, here):
     np.save(here / "wide.npy", np.eye(10, 40))
     out = run("info", "wide.npy", "--pixel-size", "0.1").out

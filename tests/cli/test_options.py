@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from mitsuba_diffraction.cli.main import Parser
 from mitsuba_diffraction.cli.options import (
     add_options,
     given,
@@ -21,7 +22,7 @@ from mitsuba_diffraction.cli.spellings import current
 @pytest.fixture
 def parser() -> argparse.ArgumentParser:
     """A parser with an option of each kind."""
-    parser = argparse.ArgumentParser(prog="test")
+    parser = Parser(prog="test")
     add_options(
         parser,
         ("FILE ...", "what is read", Path, None, {"dest": "files"}),
@@ -57,9 +58,10 @@ def test_defaults_are_told_once(parser):
 
 
 def test_options_are_refused_by_their_own_names(parser, capsys):
-    args = parser.parse_args(["a", "--layer", "x", "--range", "0:0"])
+    args = parser.parse_args(["a", "--layer", "x", "--range", "0:0", "--spp", "64"])
     names = ("thin", "layers", "range")
     assert given(args, (*names, "missing")) == {"layers": ["x"], "range": (0.0, 0.0)}
+    assert given(args, ["spp", "kind"]) == {"spp": 64}  # a default, but asked for
     assert option_of(args, "spp") == "--spp"
     refuse(args, ["thin"], ": not here")
     with pytest.raises(SystemExit):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support import crossed
-from tests.support.orders import thin_grating
+from tests.support.orders import listed_grating, thin_grating
 
 
 def test_info_describes_a_table_of_orders(run, here):
@@ -28,7 +28,7 @@ def test_maps_show_a_table_of_orders(run, here):
     assert (here / "grating-map.exr").is_file()
     refused = run("brdf-map", "grating.nc", "--material", "Al", *flags)
     assert refused.code != 0
-    assert "'material' is a parameter of the plugin 'diffraction'" in refused.err
+    assert "leave --material out" in refused.err
 
 
 def test_orders_are_listed_as_import_reads_them(run, here):
@@ -117,3 +117,23 @@ def test_a_crossed_grating_is_solved(run, here):
     assert "not allowed with --crossed" in run("solve", "flat.npy", *flags, "--duty", 0.3).err
     assert "leave out" in run("solve", "flat.npy", *flags, "--thin").err
     assert "one-dimensional" in run("solve", "flat.npy", "--period", 0.2).err
+
+
+@pytest.mark.parametrize(
+    "measured",
+    [
+        ("brdf-map", "--wavelength", 550, "--resolution", 16, "--samples", 1),
+        ("brdf-map", "--resolution", 16, "--samples", 1, "--step", 50),
+        ("spectrum", "--step", 50, "--relative", "none"),
+        ("export-bsdf", "--phi", 0, "--wavelength", 550, "--resolution", 8),
+    ],
+    ids=lambda words: " ".join(map(str, words[:2])),
+)
+def test_light_from_directions_that_were_not_solved_is_warned_of(run, here, measured):
+    listed_grating().save("grating.nc")  # of -20, 0 and 20 degrees
+    command, *flags = measured
+    angle = "--light" if command == "spectrum" else "--theta"
+    for theta, lines in ((20, 0), (45, 1)):
+        ran = run(command, "grating.nc", angle, theta, *flags, "-o", f"{theta}.csv"
+                  if command != "brdf-map" else f"{theta}.png").succeeded()  # fmt: skip
+        assert ran.err.count("gets the efficiencies of the nearest, theta 20°, phi") == lines

@@ -39,11 +39,10 @@ DAMAGED = {"empty": b"", "exr": b"\x76\x2f\x31\x01", "png": b"\x89PNG\r\n\x1a\n"
 REFUSED = {
     _MAP: {
         "-m scalar_rgb": "variant 'scalar_rgb' does not support maps",
-        "--coherence-width -1": "coherence_width='-1'",
+        "--coherence-width -1": "--coherence-width '-1' must be",
         "-o missing/a.exr": "cannot write 'missing/a.exr'",
         "--material Unobtainium": "Unobtainium",
-        "--fill hope": "fill",
-        "--method rainbow --relative": "no relative reflectance",
+        "--fill hope": "--fill: expected",
         "--method flss --relative --int-ior glass": "takes a number",
     },
     "brdf-map": {
@@ -53,6 +52,12 @@ REFUSED = {
         "nothing.png": "nothing.png",
         "--preset dvdd": "did you mean dvd",
         "noise.npy --pixel-size 0.08 --method rainbow": "needs a period",
+        "grating.npy --pixel-size 0.08 --method rainbow --relative": "no relative reflectance",
+        "grating.npy --resolution 8": "give --pixel-size in µm, for instance --pixel-size 0.05",
+        "grating.npy --pixel-size 0.08 --material n.csv": "--material 'n.csv': only",
+        "grating.npy --pixel-size 0.08 --coat-ior watr": "did you mean water",
+        "orders.nc --material gold": "a table, which has its own; leave --material out",
+        "orders.nc --fill nearest": "a table, which has its own; leave --fill out",
     },
     _SPECTRUM: {
         "--detector 89.5": "89.5",
@@ -62,12 +67,14 @@ REFUSED = {
         "--material kerratin": "keratin",
         "--pigment none.csv": "none.csv",
         "--material gold --pigment 0.2": "gold",
-        "--crops 400": "crops=400",
+        "--crops 400": "--crops 400: ",
+        "--measured none.csv": "'none.csv' does not exist",
+        "--measured measured.csv": "and the spectrum 400 to 700 nm; give others by",
         "--observer dragon": "dragon",
     },
     # heights with notes, which would be in vain
-    f"spectrum noise.npy {_SMALL}": {"--coat-ior 0.5": "coat_ior=0.5 must be"},
-    f"brdf-map noise.npy {_SMALL}": {"--coat-ior 0.5": "coat_ior=0.5 must be"},
+    f"spectrum noise.npy {_SMALL}": {"--coat-ior 0.5": "--coat-ior 0.5 must be"},
+    f"brdf-map noise.npy {_SMALL}": {"--coat-ior 0.5": "--coat-ior 0.5 must be"},
     "spectrum": {
         "empty": "empty",
         "none*.npy": "none*.npy",
@@ -75,42 +82,47 @@ REFUSED = {
         "nothere": "'nothere' does not exist",
         "--group a=grating.npy --group b=nothere": "'nothere' does not exist",
     },
-    "survey": {"nothere": "'nothere' does not exist"},
+    "survey": {
+        "nothere": "'nothere' does not exist",
+        "empty": "holds no scans; name another folder",
+        "parent": "name those in its folders, 'parent/*/*'",
+    },
     "survey grating.npy": {"-o out.csv": "writes several files; name a folder"},
     "survey grating.npy -o out": {
-        "--pixel-size 0.08 --coat-ior 0.5": "coat_ior=0.5 must be",
+        "--pixel-size 0.08 --coat-ior 0.5": "--coat-ior 0.5 must be",
         "--material kerratin": "kerratin",
         "--ext-ior melanin": "melanin",
         "--pigment blueish": "blueish",
         "--pigment 0.2 --material gold": "gold",
     },
     _EVALUATE: {
-        "--theta 95": "theta=95 must be",
-        "--method pq --tolerance 0": "tolerance=0",
-        "--coherence-width 1e300": "coherence_width='1e300'",
-        "--angles 20:10": "angles=20:10 degrees are none",
+        "--theta 95": "--theta 95 must be",
+        "--method pq --tolerance 0": "--tolerance 0",
+        "--coherence-width 1e300": "--coherence-width '1e300'",
+        "--angles 20:10": "--angles 20:10 degrees are none",
         "--angle-step 0": "angle-step=0 does not fit",
-        "--period 0": "period=0.0 must be",
-        "--order 0": "order=0 is",
+        "--period 0": "--period 0.0 must be",
+        "--order 0": "--order 0 is",
         "--material kerratin": "did you mean keratin",
-        "--material keratin --method flss": "method=flss",
+        "--material keratin --method flss": "--method flss reflects all light",
+        "--material keratin --coherence patch": "--coherence patch reflects all light",
         "-o missing/a.png": "cannot write",
     },
     "evaluate": {
         "t.exr": "is a table; this needs the heights",
-        "grating.npy --pixel-size 0.08 --positions 5000": "positions=5000 must be",
+        "grating.npy --pixel-size 0.08 --positions 5000": "--positions 5000 must be",
     },
     f"sweep terms {_SWEEP}": {
-        "--coherence-width 1e300": "coherence_width",
+        "--coherence-width 1e300": "--coherence-width '1e300'",
         "--values a": "--values: expected numbers, blanks between, got 'a'",
     },
     _PRECOMPUTE: {
         "--pixel-size 0": "'0'",
         "--pixel-size nan": "'nan'",
-        "--max-height 0.3 --height-unit nm": "without max_height",
+        "--max-height 0.3 --height-unit nm": "without --max-height",
         "--level tilt": "'tilt'",
         "--tolerance nan": "tolerance",
-        "--coherence-width 0": "coherence_width",
+        "--coherence-width 0": "--coherence-width '0'",
         "--wavelength-range 700:400": "wavelength",
         "--basis taylor --tolerance 1e-12": "tolerance",
         "--channel Height": "channel",
@@ -121,8 +133,9 @@ REFUSED = {
         "--pixel-size 80": "is the pixel size of 80 µm in nm? Then divide it by 1000",
     },
     "precompute": {
-        "scale.png --pixel-size 0.1": "max_height=0.375",
-        "scale.png --max-height 0.1": "pixel_size",
+        "scale.png --pixel-size 0.1": "--max-height 0.375",
+        "scale.png --max-height 0.1": "--pixel-size",
+        "wrong.toml": "'wrong.toml': tolerance=2",
         "none.npy": "'none.npy'",
         "empty.npy": "'empty.npy'",
         "cut.npy": "'cut.npy'",
@@ -156,6 +169,7 @@ REFUSED = {
         "lamellar --period 1": "depth",
         "missing.csv --period 1": "missing.csv",
         "heap --period 1": "expected one of",
+        "lamellar --period 1 --depth 0.1 --layer silicn:0.1": "layer 1: material='silicn'",
     },
     f"solve {_GROOVE}": {"--duty 0.5": "duty", "--material Unob": "Unob", "-o no/x.nc": "folder"},
     **{
@@ -224,7 +238,7 @@ REFUSED = {
 #: Command lines with unsuitable options, and the message after the command's name: exit code 2.
 USAGE = {
     _MAP: {
-        "--wavelength 500": "--wavelength: not allowed with argument --step",
+        "--wavelength 500": "argument --step: has no effect with one --wavelength",
         "-o a.png --spectral": "--spectral: bands need an EXR",
         "-o a.jpg": "expected a name ending in .exr or .png",
         "--material Al --int-ior 1.5": "--int-ior: not allowed with",
@@ -234,18 +248,47 @@ USAGE = {
         "--method flss --spectral": "--spectral: not allowed with",
         "--method flss --illuminant E": "under --illuminant D65 only",
         "--method flss --int-ior 1.5": "only for --relative",
+        "--method rainbow": "argument --step: has no effect with --method rainbow",
         "--relative": "--relative: only with argument --method",
         "--method ray": "--method: invalid choice",
     },
     "brdf-map grating.npy": {
-        "--wavelength 550 --exposure 0": "--wavelength: not allowed with argument --exposure"
+        "--wavelength 550 --exposure 0": "argument --exposure: has no effect with one --wavelength",
+        "--wavelength 550 --illuminant E": "argument --illuminant: has no effect",
+        "--method spectral --terms 5": "argument --terms: has no effect with --method spectral",
+        "--method pq --coherence patch": "argument --coherence: has no effect with --method pq",
     },
+    "brdf-map": {"--preset snake,orientation=3": "name the preset alone"},
+    "evaluate grating.npy --pixel-size 0.08": {
+        "--method rainbow --tolerance 0.1": "argument --tolerance: has no effect",
+        "--coherence patch --terms 5": "argument --terms: has no effect",
+    },
+    **{
+        f"sweep {kind} grating.npy --pixel-size 0.08": {
+            option: f"{option.split()[0]}: has no effect"
+        }
+        for kind, option in (
+            ("wavelength-step", "--step 5"),
+            ("coherence-width", "--coherence-width 30"),
+            ("terms", "--terms 3"),
+            ("light-angle", "--theta 0"),
+            ("method", "--method flss"),
+        )
+    },
+    "sweep terms grating.npy": {
+        "--no-compiled": "--no-compiled: is for a sweep over methods",
+        "--period 2": "--period: has no effect with --method flss",
+    },
+    "hologram logo.png": {"--turn 0": "--turn: is for a label on a mesh"},
+    "tradeoff": {"--pixel-size 0.1": "--pixel-size: needs a file of HEIGHTS"},
     "spectrum": {
         "--group a": "NAME=PATTERN",
         "--group a-b=grating.npy --group a_b=grating.npy": "columns of 'a_b'",
         "": "give files",
         "grating.npy --detector 5:1:1": "5:1:1",
         "grating.npy --azimuth north": "north",
+        "grating.npy --measured a.csv --detector 0 5": "--measured: is compared with one curve",
+        "grating.npy --measured a.csv --relative none": "--measured: is compared with one curve",
     },
     _PRECOMPUTE: {
         "--coherence nonsense": "nonsense",
@@ -267,10 +310,13 @@ USAGE = {
         "-o a.obj": ".ply",
         "-o a.ply --along w": "'w'",
         "-o a.ply --rotate x": "'x'",
+        "-o a.ply --smoothing 0.1": "--smoothing: has no effect without a guide",
     },
     "export-osl": {
         "orders.nc --material Al --int-ior 1.5": "not allowed with",
         "orders.nc --addon a.zip": "--addon",
+        "--addon a.zip --name b": "--name: not allowed with argument --addon",
+        "--addon a.zip --material gold": "--material: not allowed with argument --addon",
     },
     "export-shader": {
         "grating.toml --material Al --int-ior 1.5": "not allowed with",
@@ -293,11 +339,13 @@ USAGE = {
     "render": {
         "--plan scale.xml": "to have one made, write SCENE --plan",
         "scale.xml --paths 9": "--paths: is for --plan",
+        "scale.xml --paths 131072": "--paths: is for --plan",
+        "scale.xml --plan a.toml --paths 9": "--paths: has no effect on the recipes of --plan",
         "scale.xml --plan --frames 2 --turn width": "argument --plan: is for one picture",
     },
     "plan scale.xml": {
         "--paths 1": "expected a whole number from 2",
-        f"--paths {2**23}": "--paths: at most",
+        f"--paths {2**23}": "--paths: expected a whole number from 2 to 4194304",
     },
     _RENDER: {
         "-D spp": "-D",
@@ -313,9 +361,11 @@ USAGE = {
         "--denoise --workers 2": "is for one process",
         "--observer dog -o a.png": "writes an EXR",
         "--illuminant leaves": "--observer; name one",
+        "--observer dog --tonemap natural": "--tonemap: has no effect",
         "--frames 2": "say what changes, with --animate or --turn",
-        _LIGHT: "belong to --frames",
-        "--fps 3": "belong to --frames",
+        _LIGHT: "--animate: belongs to --frames",
+        "--fps 3": "--fps: belongs to --frames",
+        "--fps 24": "--fps: belongs to --frames",
         f"--frames 0 {_LIGHT}": "expected a whole number from 1",
     },
     _FRAMES: {
@@ -325,6 +375,7 @@ USAGE = {
         "--animate spp=nan:1": "expected numbers",
         f"{_LIGHT} -D spp=1": "leave -D spp=1 out",
         f"{_LIGHT} --turn spp": "'spp' is set more than once",
+        f"{_LIGHT} --fps 3": "--fps: is for a film",
         f"{_LIGHT} -o a.avi": "a film ending in .webp or .gif or .mp4",
     },
 }
@@ -345,6 +396,9 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "empty.ply": "",
         "ply.ply": "ply",
         "a.sxm": ":NANONIS_VERSION:\n2\n",
+        "measured.csv": "wl,R\n800,0.1\n900,0.2\n",
+        "wrong.toml": 'generator = "sinusoidal"\noutput = "a.exr"\ntolerance = 2\n'
+        "[arguments]\nperiod = 1.0\ndepth = 0.1\n",
         "digits.toml": f"repeat = {5000 * '9'}\n",
         "groove.toml": 'method = "solved"\nprofile = "sinusoidal"\nmaterial = "none"\n'
         'output = "groove.nc"\n[arguments]\nperiod = 0.5\ndepth = 0.05\n',
@@ -356,6 +410,8 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_board(folder / "bare.obj", with_uv=False)
     for name in ("empty", "folder.exr", "folder.html"):
         (folder / name).mkdir()
+    (folder / "parent" / "sub").mkdir(parents=True)
+    (folder / "parent" / "sub" / "scan.npy").touch()
     (folder / "empty.npy").touch()
     (folder / "cut.npy").write_bytes(b"\x93NUMPY\x01\x00")
     x = np.arange(75) * 0.08

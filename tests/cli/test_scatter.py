@@ -67,6 +67,6 @@ def test_the_tilt_of_a_mirror_is_levelled_or_said(run, here, slope, said):
     np.save("mirror.npy", smooth + slope * 0.3 * np.arange(64))
     asked = ("scatter", "mirror.npy", "--pixel-size", "0.3", "--json", "figures.json")
     ran = run(*asked).succeeded()
-    assert ("level=plane" in ran.err) is said, ran.err
+    assert ("--level plane" in ran.err) is said, ran.err
     row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
     assert (row["tis_table"] < 1e-3) is not said

@@ -202,3 +202,18 @@ def test_an_observer_has_catches_of_each_column_and_contrasts_of_each_pair(run, 
         ran = run("spectrum", scans / "scan0.npy", *PIXEL, "--observer", *arguments)
         assert ran.code == 1
         assert named in ran.err
+
+
+def test_a_measured_curve_is_drawn_beside_and_compared(run, scans, here):
+    how = (scans / "scan0.npy", *PIXEL, *QUICK, "--detector", "10", "--json", "s.json")
+    run("spectrum", *how, "-o", "a.csv").succeeded()
+    rows = read("a.csv")
+    alone, values = (here / "a.png").read_bytes(), rows["light30_detector10"]
+    lines = [f"{w:g},{v + 3.0:g}" for w, v in zip(rows["wl"], values, strict=True) if w < 650]
+    (here / "m.csv").write_text("\n".join(["wl,R (%)", *lines]))
+    ran = run("spectrum", *how, "--measured", "m.csv", "-o", "a.csv").succeeded()
+    assert "m.csv: RMS difference 3 %" in ran.out
+    assert "400 to 600 nm" in ran.out
+    measured = json.loads((here / "s.json").read_text("utf-8"))["measured"]
+    assert measured["rms"] == pytest.approx(0.03, rel=1e-3)
+    assert (here / "a.png").read_bytes() != alone

@@ -32,7 +32,7 @@ from ...plugin.memory import upload
 from ...progress import Progress
 from ..known_wavelengths import check_lit
 from ..maps.evaluate import opaque
-from ..maps.hemisphere import flat_interaction, polar, sub_samples
+from ..maps.hemisphere import flat_interaction, polar, sub_samples, vectors
 
 #: Files hold the reflected light of one place.
 FILES = Consumer(
@@ -221,7 +221,7 @@ def laid(
         )
     require_loaded_llvm()
     surface = FILES.described(bsdf)
-    check_lit(surface, grid.wavelengths)
+    check_lit(surface, grid.wavelengths, grid.theta, grid.phi)
     shortest, longest = (float(wavenumber(grid.wavelengths[n])) for n in (0, -1))
     lobe = 1.0 / (math.sqrt(2.0) * surface.sigma * shortest)
     solved = surface.solved and surface.nested is None and lobe < 0.5 * nodes.size
@@ -283,10 +283,7 @@ def _evaluated(bsdf: Any, wi: Real, wo: Real, wavelengths: Real, bands: Real, sh
 
     bands : (w,) widths of bands, nm; shift : (n,) in widths of the band.
     """
-    towards, out = (
-        mi.Vector3f(*(upload(mi.Float, axis.astype(np.float32)) for axis in part.T))
-        for part in (wi, wo)
-    )
+    towards, out = vectors(wi), vectors(wo)
     si = flat_interaction(towards, len(wo))
     shifts, packet = upload(mi.Float, shift.astype(np.float32)), len(mi.UnpolarizedSpectrum())
     result = np.empty((len(wo), len(wavelengths)))

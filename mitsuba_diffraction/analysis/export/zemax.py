@@ -23,6 +23,8 @@ DEFAULT = ExportGrid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 360.0, 30.0), np
 # Nodes of the azimuth; the last is the first.
 _AZIMUTHS = 73
 _REACH = 170.0
+# Letters of units in comments, which are ASCII.
+_ASCII = str.maketrans({"µ": "u", "μ": "u", "°": " deg", "×": "x", "–": "-"})
 
 
 def save_zemax(
@@ -59,8 +61,9 @@ def save_zemax(
         table = of_light.values[..., 0]
         lines.append(f"TIS {of_light.light.sum():.6g}")
         lines += [_row(row) for row in (*table, table[0])]
+    content = "\n".join([*lines, "DataEnd", ""]).translate(_ASCII)
     with atomic_path(path) as temporary:
-        temporary.write_text("\n".join([*lines, "DataEnd", ""]), "ascii", "replace")
+        temporary.write_text(content, "ascii", "replace")
 
 
 def _frame(wi: Real) -> tuple[Real, Real, Real]:

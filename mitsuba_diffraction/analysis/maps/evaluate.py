@@ -85,8 +85,9 @@ def brdf_map(
         MAPS.check(described)
     surface = described if isinstance(described, Surface) else None
     # colours of orders that miss visible light are named when their table loads
-    if surface is not None and (bands.is_single or spectral or not surface.solved):
-        check_lit(surface, np.array([bands.low, bands.high]))
+    if surface is not None:
+        named = bands.is_single or spectral or not surface.solved
+        check_lit(surface, np.array([bands.low, bands.high] if named else []), theta, phi)
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
     sigma = None if surface is None else surface.sigma
     narrowest = 0.5 if sigma is None else 1 / (2**0.5 * sigma * float(wavenumber(bands.low)))

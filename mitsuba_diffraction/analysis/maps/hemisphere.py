@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import DiffractionError
+from ...plugin.memory import upload
 
 SMALLEST, LARGEST = 8, 4096
 MOST_SAMPLES = 1024
@@ -29,6 +30,11 @@ def polar(theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
     """Return unit vectors (..., 3) of angles in rad from the normal, and from x towards y."""
     sine = np.sin(theta)
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)], axis=-1)
+
+
+def vectors(directions: NDArray[np.float64]) -> Any:
+    """Return directions (n, 3) as mi.Vector3f."""
+    return mi.Vector3f(*(upload(mi.Float, column.astype(np.float32)) for column in directions.T))
 
 
 def flat_interaction(wi: Any, count: int) -> Any:

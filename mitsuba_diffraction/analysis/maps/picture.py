@@ -44,17 +44,16 @@ _SMALLEST_SIDE, _MOST_COLUMNS = 2.3, 4
 ATTRIBUTE = "brdf_map"
 
 
-def draw(
-    axes: Axes, brdf_map: BrdfMap, exposure: float | None = None, *, marks: bool = True
-) -> AxesImage:
+def draw(axes: Axes, brdf_map: BrdfMap, exposure: float | None = None) -> AxesImage:
     """Draw a map into axes: colours at f × 2^exposure, or false colours of one wavelength.
+
+    Marks are circles of equal angle, the mirror direction (+), and the light (a ring with a dot).
 
     Parameters
     ----------
     axes : axes; the function sets limits and aspect.
     brdf_map : the map.
     exposure : stops; by default `brdf_map.exposure()`. Not used for a single wavelength.
-    marks : circles of equal angle, the mirror direction (+), and the light (a ring with a dot).
 
     Returns
     -------
@@ -79,8 +78,7 @@ def draw(
         shown = axes.imshow(brdf_map.srgb(stops), **common)
     ticks = (-1.0, -0.5, 0.0, 0.5, 1.0)
     axes.set(xlim=(-1.02, 1.02), ylim=(-1.02, 1.02), aspect="equal", xticks=ticks, yticks=ticks)
-    if marks:
-        _draw_marks(axes, brdf_map)
+    _draw_marks(axes, brdf_map)
     return shown
 
 

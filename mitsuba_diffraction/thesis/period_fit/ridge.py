@@ -234,7 +234,9 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
     u = _frequencies(response, order)
     wavelengths = response.beam.waves(response.wavelengths)
     sigma = response.sigma / response.beam.index
-    first = _ORDER_0 / (2.0 * np.pi * sigma)
+    # lower orders of the same gratings send more light
+    lower = abs(order) - 0.5 if abs(order) > 1 else 0.0
+    first = max(_ORDER_0 / (2.0 * np.pi * sigma), lower / max(expected, default=np.inf))
     last = u.max() / wavelengths.min()
     if not last > first:
         return None
@@ -285,12 +287,17 @@ def _contrast(lines: Real, light: Real, sigma: float) -> tuple[Real, Real]:
     return lobe / max(total[-1], 1e-300), lobe / width / beside
 
 
-def _frequencies(response: Response, order: int) -> Real:
-    """Return u = sinθi − sinθo (A,), positive on the side of an order."""
+def check_order(order: int) -> None:
+    """Refuse order 0, which no period follows from."""
     if order == 0:
         raise DiffractionError(
             "order=0 is the mirror direction at every wavelength; give 1, -1, 2, ..."
         )
+
+
+def _frequencies(response: Response, order: int) -> Real:
+    """Return u = sinθi − sinθo (A,), positive on the side of an order."""
+    check_order(order)
     u = response.beam.sine - np.sin(np.radians(response.angles))
     return np.asarray(np.sign(order) * u)
 

@@ -110,9 +110,13 @@ def _lattice(count: int) -> Real:
 
 
 def thesis_fit(
-    table: DiffractionTable, beam: Beam, wavelengths: Real, angles: Real, order: int = 1
-) -> Fit:
+    table: DiffractionTable, beam: Beam, wavelengths: Real, angles: Real, order: int = 1,
+    period: float | None = None,
+) -> Fit:  # fmt: skip
     """Fit a period by the thesis' procedure, at viewing angles across the normal, from 0.
+
+    An order beyond the first is searched at up to 1.5 times larger or smaller periods than `period`
+    in µm: the first order is brighter.
 
     On the light's side, the response of the procedure grows towards the horizon. The response is
     C·S at κ = k, with the window on the patch's corner, of a table with coherence="patch".
@@ -127,4 +131,5 @@ def thesis_fit(
 
     label = "thesis' procedure"
     response = measure(relative, beam, wavelengths, across, sigma=table.sigma, label=label)
-    return fit_period(ridge_of(response, order))
+    near = period if abs(order) > 1 else None
+    return fit_period(ridge_of(response, order, period=near, within=1.5))

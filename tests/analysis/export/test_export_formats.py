@@ -386,3 +386,10 @@ def test_surfaces_that_transmit_and_too_large_files_are_refused(tmp_path):
     with pytest.raises(DiffractionError, match="theta: expected rising"):
         rgl.save_rgl(mirror, tmp_path / "x.bsdf", rgl.DEFAULT._replace(theta=np.array([95.0])))
     assert not list(tmp_path.iterdir())
+
+
+def test_a_zemax_comment_keeps_its_units(tmp_path):
+    file = tmp_path / "a.bsdf"
+    grid = ExportGrid(np.array([0.0]), np.array([0.0]), np.array([550.0]), 9)
+    zemax.save_zemax(mi.load_dict(grating()), file, grid, "65 µm at 30°")
+    assert "# 65 um at 30 deg" in file.read_text("ascii")

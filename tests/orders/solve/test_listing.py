@@ -10,6 +10,9 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.listing import list_orders
+from mitsuba_diffraction.orders.solve.orders import solve_orders
+from mitsuba_diffraction.orders.solve.profiles import sinusoidal
+from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from mitsuba_diffraction.reference.model import small_slope
 from tests.orders.kinds import light
@@ -132,3 +135,14 @@ def test_light_outside_the_directions_of_a_list_is_warned_of(theta, phi, nearest
         warnings.simplefilter("always")
         list_orders(table, 580.0, theta, phi)
     assert [nearest in str(each.message) for each in caught] == [True] * (nearest is not None)
+
+
+def test_the_mean_albedo_is_that_of_the_listed_lights_and_of_orders_that_propagate():
+    table = solve_orders(
+        sinusoidal(0.6, 0.1), "Al", theta=[-10.0, 30.0], step=25.0,
+        settings=Settings((500.0, 600.0), resolution=12),
+    )  # fmt: skip
+    rows = [list_orders(table, np.arange(500.0, 601.0, 25.0), t).rows for t in (-10.0, 30.0)]
+    listed = np.mean([part[:, 4].sum() / 5.0 for part in rows])
+    assert table.albedo == pytest.approx(listed, abs=1e-6)
+    assert listed < 0.95  # the orders that do not propagate would add their neighbours' light
