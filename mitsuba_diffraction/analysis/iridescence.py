@@ -30,7 +30,7 @@ from ..errors import DiffractionError
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import sigma_of, wavenumber
 from ..tables import DiffractionTable
-from ..tables.powers import order_0_power, power_series
+from ..tables.powers import as_powers, order_0_power
 from .maps.hemisphere import flat_interaction, vectors
 from .maps.result import LightDirection
 
@@ -249,13 +249,15 @@ def diffracted_light(
             f"iridescence requires a table from {SHORTEST:g} nm on, and this table starts at "
             f"{table.wavelength_range[0]:g} nm; build it with a wider wavelength_range"
         )
-    coefficients, _, scale, expansion = power_series(table.averaged)
+    table.require_whole("a list of powers is made of")
+    stored = as_powers(table.averaged)
+    expansion, coefficients = stored.expansion, stored.coefficients[:, :, :, 0].astype(np.float32)
     width = min(WINDOW, table.window_width)
     # the orders of a scan have its taper's lobes already
     sigma = (sigma_of(width) ** -2 - table.inverse_taper) ** -0.5
     kappas = np.arange(_NODES + 1) * (expansion.kappa_max / _NODES)
-    factors = (expansion.weights(kappas) / scale).astype(np.float32)
-    intervals, coefficients = expansion.interval(kappas), coefficients.astype(np.float32)
+    factors = (expansion.weights(kappas) / stored.scale).astype(np.float32)
+    intervals = expansion.interval(kappas)
     qx, qy = (
         spacing * np.arange(-last, last + 1)
         for spacing, last in zip(table.spacing, table.grid.last, strict=True)

@@ -5,7 +5,7 @@ The formulas are `optics.boundary.MODELS`. With J' = 2 cosθi cosθo J,
     f cosθo = N' / (λ² A w² cosθi) · ⟨|P|²⟩,   N' = ½ Σ|J'|²,
 
 and in polarised variants the Mueller matrix of J' takes the place of N'. Order 0 has the factor
-`Boundary.mirror` in place of N'/(w² cosθi cosθo).
+`order_0` in place of N'/(w² cosθi cosθo), which no model decides.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from .materials import Material, Perfect
 from .memory import index_between, read_record, upload
 from .types import Float, Number, Spectrum, Vector3f
 
-#: The model of flat faces and of a perfect reflector, which has no index.
+#: The model of a perfect reflector, which has no index.
 KIRCHHOFF = model_of("kirchhoff")
 
 
@@ -52,10 +52,6 @@ class HeightStatistic:
     """A statistic of the heights at an order's frequency, linear between nodes."""
 
     def __init__(self, table: RoughnessTable) -> None:
-        self.take(table)
-
-    def take(self, table: RoughnessTable) -> None:
-        """Look up a statistic of other heights from now on."""
         self._first = table.first
         nodes = table.nodes.astype(np.float32)
         self._last = len(nodes) - 2.0
@@ -91,14 +87,11 @@ class Boundary:
     material: Material
     statistic: HeightStatistic | None = None
 
-    def of(self, material: Material) -> Boundary:
-        """Return the model of another material on the same heights."""
-        return replace(self, material=material)
-
-    def take(self, roughness: RoughnessTable) -> None:
-        """Have other heights from now on, with all boundaries `of` other materials."""
-        if self.statistic is not None and self.model.statistic is not None:
-            self.statistic.take(self.model.statistic(roughness))
+    def on(self, roughness: RoughnessTable) -> Boundary:
+        """Return the model on heights of this roughness."""
+        if self.model.statistic is None:
+            return self
+        return replace(self, statistic=HeightStatistic(self.model.statistic(roughness)))
 
     def factor(
         self,
@@ -124,36 +117,6 @@ class Boundary:
             return self.material.channels(powers)
         matrices = [self.model.jones(light.pair, *channel) for channel in channels]
         return self._of_matrices(light, matrices, [index for index, _ in channels])
-
-    def mirror(
-        self,
-        pair: Pair,
-        wavenumbers: list[Float],
-        sigma_0: Float,
-        indices: list[Number],
-        mode: mi.TransportMode,
-    ) -> Spectrum:
-        """Return N_0 C(X_i) C(X_o) of eq. 10, or its Mueller matrix, for each channel.
-
-        sigma_0 : σ₀ of the window on the surface, µm; other parameters as of `factor`.
-        """
-        outer, waves = pair.outer, self.material.wavenumbers(wavenumbers)
-        visible = mi.UnpolarizedSpectrum([outer.visible(sigma_0, k) for k in wavenumbers])
-        if isinstance(self.material, Perfect):
-            return mi.depolarizer(visible)
-        channels = _side_by_side(indices, [outer.mirror_cosine(k * sigma_0) for k in waves])
-        coat = pair.n if isinstance(pair, CoatedPair) else None
-        if not mi.is_polarized:
-            powers = [
-                reflectance(cosine, index)
-                if coat is None
-                else beneath_reflectance(cosine, coat, index)
-                for index, cosine in channels
-            ]
-            return self.material.channels(powers) * visible
-        light = LightPath.of(pair, mode)
-        matrices = [mirror(light.pair, cosine, index, coat) for index, cosine in channels]
-        return mi.Spectrum(visible) * light.mueller(matrices)
 
     def _of_matrices(
         self, light: LightPath, matrices: list[Jones], indices: list[Number]
@@ -185,9 +148,36 @@ class Boundary:
 def boundary_of(model: str, material: Material, roughness: RoughnessTable) -> Boundary:
     """Return the boundary of a model; a perfect reflector, without an index, has Kirchhoff's."""
     chosen = KIRCHHOFF if isinstance(material, Perfect) else model_of(model)
-    if chosen.statistic is None:
-        return Boundary(chosen, material)
-    return Boundary(chosen, material, HeightStatistic(chosen.statistic(roughness)))
+    return Boundary(chosen, material).on(roughness)
+
+
+def order_0(
+    material: Material,
+    pair: Pair,
+    wavenumbers: list[Float],
+    sigma_0: Float,
+    indices: list[Number],
+    mode: mi.TransportMode,
+) -> Spectrum:
+    """Return N_0 C(X_i) C(X_o) of eq. 10, or its Mueller matrix, for each channel.
+
+    sigma_0 : σ₀ of the window on the surface, µm; other parameters as of `Boundary.factor`.
+    """
+    outer, waves = pair.outer, material.wavenumbers(wavenumbers)
+    visible = mi.UnpolarizedSpectrum([outer.visible(sigma_0, k) for k in wavenumbers])
+    if isinstance(material, Perfect):
+        return mi.depolarizer(visible)
+    channels = _side_by_side(indices, [outer.mirror_cosine(k * sigma_0) for k in waves])
+    coat = pair.n if isinstance(pair, CoatedPair) else None
+    if not mi.is_polarized:
+        powers = [
+            reflectance(cosine, index) if coat is None else beneath_reflectance(cosine, coat, index)
+            for index, cosine in channels
+        ]
+        return material.channels(powers) * visible
+    light = LightPath.of(pair, mode)
+    matrices = [mirror(light.pair, cosine, index, coat) for index, cosine in channels]
+    return mi.Spectrum(visible) * light.mueller(matrices)
 
 
 def _side_by_side(indices: list[Number], others: list[Any]) -> list[tuple[Number, Any]]:

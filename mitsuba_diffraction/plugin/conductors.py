@@ -83,11 +83,8 @@ def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
     if mi.is_monochromatic or not values.any():  # Mitsuba refuses spectra that are 0 everywhere
         value = float(np.interp(wavelength, nodes, values))
         return mi.load_dict({"type": "uniform", "value": value})
-    # Mitsuba has 0 beyond
-    ends = np.union1d(nodes, [x for x in _ENDS if not nodes[0] <= x <= nodes[-1]])
-    extended = np.interp(ends, nodes, values)
     if mi.is_spectral:
-        lists = (", ".join(map(str, numbers.tolist())) for numbers in (ends, extended))
+        lists = (", ".join(map(str, part.tolist())) for part in extended(nodes, values))
         return mi.load_dict(
             {"type": "irregular", **dict(zip(("wavelengths", "values"), lists, strict=True))}
         )
@@ -95,6 +92,12 @@ def spectrum_texture(nodes: Array, values: Array, wavelength: float) -> Texture:
     eta = {"type": "spectrum", "value": list(zip(nodes.tolist(), values.tolist(), strict=True))}
     none = {"type": "uniform", "value": 0.0}
     return children(mi.load_dict({"type": "conductor", "eta": eta, "k": none}))["eta"]
+
+
+def extended(nodes: Array, values: Array) -> tuple[Array, Array]:
+    """Return a spectrum that is constant beyond its nodes (nm), where Mitsuba has 0."""
+    ends = np.union1d(nodes, [x for x in _ENDS if not nodes[0] <= x <= nodes[-1]])
+    return ends, np.interp(ends, nodes, values)
 
 
 def _known(material: str) -> tuple[Array, Array] | None:

@@ -127,7 +127,6 @@ class Surface:
     coherence : "ensemble", "patch" or "surface".
     heights : function that reads the heights of the table; None for solved orders.
     height_scale, lateral_scale : factors on the heights and lengths of the table's patch.
-    largest_scale : largest height scale of the table.
     kind : of the structure's material: MIRROR, DIELECTRIC, RARER or CONDUCTOR; None for solved
         orders.
     index : of the material, see `Index`; None of a mirror and for solved orders. In RGB variants it
@@ -155,7 +154,6 @@ class Surface:
     heights: Callable[[], HeightField] | None = None
     height_scale: Quantity = field(default_factory=lambda: Quantity(1.0))
     lateral_scale: Quantity = field(default_factory=lambda: Quantity(1.0))
-    largest_scale: float | None = None
     kind: Feature | None = None
     index: Index | None = None
     material: str = ""

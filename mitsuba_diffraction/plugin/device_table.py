@@ -384,7 +384,5 @@ def _log2(exponent: float) -> float:
     return -float(exponent) / math.log(2.0)
 
 
-@once_a_table
-def device_table(table: DiffractionTable) -> DeviceTable:
-    """Return the table in the current variant's memory."""
-    return DeviceTable(table)
+#: The table in the current variant's memory.
+device_table = once_a_table(DeviceTable)

@@ -199,14 +199,13 @@ import mitsuba as mi
 
 from ..optics.geometry import vcavity
 from . import parameters as read
-from .arithmetic import maximum, plain
-from .boundary import KIRCHHOFF, Boundary
+from .arithmetic import plain
 from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
 from .energy import EnergyModel, reflectors_of
 from .layers import UnderCoat, UnderFilm
 from .properties import choice
-from .sampling import EVEN, direction_of, with_even_share
+from .sampling import direction_of, drawn, with_even_share
 from .surface import DiffractingSurface
 from .types import (
     Colour,
@@ -228,7 +227,7 @@ class Diffraction(DiffractingSurface):
 
     Attributes
     ----------
-    coat : the clear layer over the structure, or None; mirror : its face.
+    coat : the clear layer over the structure, or None.
     vcavity : whether the surface shadows itself like V-shaped grooves.
     """
 
@@ -243,7 +242,6 @@ class Diffraction(DiffractingSurface):
         self.vcavity = choice(props, "shadowing", SHADOWINGS) == "vcavity"
         if self.coat is not None:
             self.fresnel = UnderCoat(self.boundary.material, self.coat)
-            self.mirror = Boundary(KIRCHHOFF, self.coat)
         self.energy = EnergyModel(
             self.table.wavelength_range,
             self.wavelength,
@@ -287,7 +285,7 @@ class Diffraction(DiffractingSurface):
         # Eq. 4 to 10: N' or a Mueller matrix from Jones matrices
         value = self.lobe(ctx, site, pair, self.boundary, power, active, shadowing)
         if self.coat is not None:
-            value += self.face(ctx, site, pair.outer, self.mirror, active)
+            value += self.face(ctx, site, pair.outer, self.coat, active)
         if self.energy.scales:
             # s(ωi) s(ωo), so that no direction reflects more than it receives
             value *= mi.Spectrum(self.energy.factor(site, pair.outer.wo))
@@ -301,11 +299,13 @@ class Diffraction(DiffractingSurface):
     def draw(self, ctx: Context, site: Site, sample1: Float, sample2: Vector2f) -> Vector3f:
         """See `SurfaceBSDF.draw`."""
         wi = site.si.wi
-        ordered = maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0)
         scale = dr.detach(self._drawing_scale(site))
-        uv = self.power.draw(mi.Frame3f.cos_theta(wi), scale, ordered, sample2, site.si)
-        direction = direction_of(site.frame.from_table(uv) - mi.Vector2f(wi.x, wi.y))
-        return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction)
+
+        def by_orders(sample1: Float) -> Vector3f:
+            uv = self.power.draw(mi.Frame3f.cos_theta(wi), scale, sample1, sample2, site.si)
+            return direction_of(site.frame.from_table(uv) - mi.Vector2f(wi.x, wi.y))
+
+        return drawn(by_orders, sample1, sample2)
 
     def _drawing_scale(self, site: Site) -> Float:
         """Height scale to draw directions for: under a coat κ is as if heights were larger."""

@@ -53,6 +53,7 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -72,21 +73,22 @@ from ..optics.through import (
 from . import parameters as read
 from .arithmetic import plain
 from .base import asked_sides
-from .boundary import KIRCHHOFF, Boundary, mueller, polarisation_axes
+from .boundary import Boundary, mueller, polarisation_axes
 from .directions import (
     CoatedPair,
     Pair,
     PairBelow,
     PairThrough,
     PairWithin,
-    Sides,
     Site,
     TablePoint,
+    drawing_cosine,
+    media,
 )
 from .energy import EnergyModel, dielectric_of
 from .materials import Dielectric, Inside
 from .properties import flag
-from .sampling import EVEN, direction_of, with_even_share
+from .sampling import direction_of, drawn, with_even_share
 from .surface import DiffractingSurface, interfering
 from .types import (
     Context,
@@ -109,7 +111,6 @@ class DiffractionDielectric(DiffractingSurface):
     Attributes
     ----------
     material : the dielectric.
-    boundary, inner_boundary : models of light that is reflected above and below the surface.
     thin : whether the side below is beyond the flat side of a sheet.
     """
 
@@ -122,8 +123,6 @@ class DiffractionDielectric(DiffractingSurface):
         super().__init__(props, nested, material, plain(material.eta))
         self.material: Dielectric = material
         self.thin = flag(props, "thin", False)
-        self.inner_boundary = self.boundary.of(Inside(material, self.thin))
-        self.mirror = Boundary(KIRCHHOFF, material)
         self.energy = EnergyModel(
             self.table.wavelength_range,
             self.wavelength,
@@ -133,14 +132,19 @@ class DiffractionDielectric(DiffractingSurface):
         self.ready()
 
     @property
+    def inner_boundary(self) -> Boundary:
+        """Model of light that is reflected below the surface."""
+        return replace(self.boundary, material=Inside(self.material, self.thin))
+
+    @property
     def media_differ(self) -> bool:
         """See `SurfaceBSDF.media_differ`."""
         return not self.thin
 
     def relative_index(self, cos_i: Float, cos_o: Float) -> Float:
         """See `SurfaceBSDF.relative_index`."""
-        sides = Sides.of(self.material.eta, self.thin, cos_i > 0.0)
-        return sides.out / sides.into
+        into, out = media(self.material.eta, self.thin, cos_i > 0.0)
+        return out / into
 
     # ------------------------------------------------------------------ light and draws
 
@@ -164,8 +168,7 @@ class DiffractionDielectric(DiffractingSurface):
             crossing = PairThrough(si, wo, frame, lit, self.material.eta, self.thin)
             passed = self._transmitted(ctx, site, crossing) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
-            out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
-            orders = self.power.density(crossing, site.scale, si) * dr.square(out)
+            orders = self.power.density(crossing, site.scale, si) * dr.square(crossing.out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         if self.energy.scales:
             # s(ωi) s(ωo), such that reflected and transmitted light add up to 1
@@ -181,21 +184,19 @@ class DiffractionDielectric(DiffractingSurface):
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
         )
         down, n = cos_i > 0.0, dr.detach(self.material.eta)
-        sides = Sides.of(n, self.thin, down)
-        out = dr.select(reflected, sides.into, sides.out)
+        into, beyond = media(n, self.thin, down)
+        out = dr.select(reflected, into, beyond)
         sign = dr.select(reflected & down, 1.0, -1.0)
         cosine = dr.abs(cos_i)
-        drawn = self.power.draw(
-            dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
-            dr.detach(site.scale * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
-            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
-            sample2,
-            si,
-        )
-        total = sign * site.frame.from_table(drawn) - sides.into * mi.Vector2f(si.wi.x, si.wi.y)
-        wo = dr.select(
-            sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
-        )
+        inwards = dr.select(reflected, cosine, drawing_cosine(cosine, n, self.thin, down))
+        scale = dr.detach(site.scale * dr.select(reflected & (cos_i < 0.0), n, 1.0))
+
+        def by_orders(sample1: Float) -> Vector3f:
+            uv = self.power.draw(inwards, scale, sample1, sample2, si)
+            total = sign * site.frame.from_table(uv) - into * mi.Vector2f(si.wi.x, si.wi.y)
+            return direction_of(total / out)
+
+        wo = drawn(by_orders, sample1, sample2)
         # 0, where no light goes, of a direction beyond the horizon
         wo.z = dr.maximum(wo.z, 0.0)
         wo.z = dr.select(reflected == down, wo.z, -wo.z)
@@ -221,7 +222,7 @@ class DiffractionDielectric(DiffractingSurface):
             pair = CoatedPair(outer, n)
             power = self.power.power(pair, site.scale, si)
             value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
-            value += self.face(ctx, site, outer, self.mirror, lit)
+            value += self.face(ctx, site, outer, self.material, lit)
             return value, self.power.density(outer, site.scale * n, si)
         inner = PairWithin(si, wo, site.frame, lit, n)
         power = self.power.power(inner.place, site.scale, si)
@@ -264,7 +265,7 @@ class DiffractionDielectric(DiffractingSurface):
         if mi.is_rgb and power.cosine is None:  # a channel out of gamut stays finite where w → 0
             zeroth = dr.minimum(power.zeroth, power.others + power.zeroth)
             power = Powers(power.others + power.zeroth - zeroth, zeroth)
-        per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
+        per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.above.z * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
         others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))
         flat = self._order_0(ctx, site, crossing, pair)
@@ -314,8 +315,7 @@ class DiffractionDielectric(DiffractingSurface):
     ) -> Spectrum:
         """Return ½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:
-            powers = [power(jones) for jones in matrices]
-            return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
+            return self.material.channels([power(jones) for jones in matrices])
         # light that goes up is that which goes down, reversed: with other s, so other signs
         importance = ctx.mode == mi.TransportMode.Importance
         falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)

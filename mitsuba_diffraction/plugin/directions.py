@@ -243,6 +243,7 @@ class PairThrough:
     above, below : directions where they are measured; inside : the one in the dielectric.
     place : of the look-up.
     uv, w, cos_i, cos_o, frame, asked : what `PowerModel.density` asks of a pair.
+    out : index of the medium of ωo, over that of the medium above.
     leaves : whether the direction below is within the critical angle.
     """
 
@@ -264,19 +265,18 @@ class PairThrough:
         if thin:
             x, y, z = refracted(self.below, n)
             self.inside = mi.Vector3f(x, y, -z)
-        self.q0, self.q = self.above.z, -n * self.inside.z
         total = frame.to_table(self.above + n * self.inside)
-        w = self.q - self.q0
+        w = -n * self.inside.z - self.above.z
         reached = dr.squared_norm(total) < dr.square(_FARTHEST * frame.stretch)
         self.active = active & reached
         self.place = TablePoint(
             dr.select(self.active, dr.select(w > 0.0, -total, total), 0.0),
             dr.maximum(dr.abs(w), _LEAST_W),
         )
-        sides = Sides.of(n, thin, down)
-        self.cos_i = sides.cosine(dr.abs(si.wi.z), n, down, thin)
+        into, self.out = media(n, thin, down)
+        self.cos_i = drawing_cosine(dr.abs(si.wi.z), n, thin, down)
         self.cos_o = dr.select(active, dr.abs(wo.z), 1.0)
-        self.uv, self.w = -frame.to_table(sides.into * si.wi + sides.out * wo), self.place.w
+        self.uv, self.w = -frame.to_table(into * si.wi + self.out * wo), self.place.w
         turned = self.below * mi.Vector3f(1.0, 1.0, -1.0)
         self._beyond = turned if thin else outside(turned, n)
         self.leaves = self._beyond.z > 0.0
@@ -292,28 +292,20 @@ class PairThrough:
         return mirror_cosine(half, self.above.z, self._beyond.z, sharpness)
 
 
-@dataclass(frozen=True)
-class Sides:
-    """Optical indices of the sides that light comes from and goes to."""
+def media(n: Float, thin: bool, down: Mask) -> tuple[Float, Float]:
+    """Return the indices of the media that light goes through, downwards where `down`: from, to."""
+    above = mi.Float(1.0)
+    if thin:
+        return above, above
+    return dr.select(down, above, n), dr.select(down, n, above)
 
-    into: Float
-    out: Float
 
-    @classmethod
-    def of(cls, n: Float, thin: bool, down: Mask) -> Sides:
-        """Return the indices of light that goes through, downwards where `down`."""
-        outside = mi.Float(1.0)
-        if thin:
-            return cls(outside, outside)
-        return cls(dr.select(down, outside, n), dr.select(down, n, outside))
-
-    @staticmethod
-    def cosine(cosine: Float, n: Float, down: Mask, thin: bool) -> Float:
-        """Half of w of the refracted direction, which is what tables sample from as cosθi."""
-        square = n * n - 1.0
-        deeper = dr.sqrt(dr.fma(cosine, cosine, square)) - cosine
-        if thin:
-            return 0.5 * deeper
-        inside = n * cosine
-        outer = inside - dr.safe_sqrt(dr.fma(inside, inside, -square))
-        return 0.5 * dr.select(down, deeper, outer)
+def drawing_cosine(cosine: Float, n: Float, thin: bool, down: Mask) -> Float:
+    """Return half of w of the refracted direction, which is what tables draw from as cosθi."""
+    square = n * n - 1.0
+    deeper = dr.sqrt(dr.fma(cosine, cosine, square)) - cosine
+    if thin:
+        return 0.5 * deeper
+    inside = n * cosine
+    outer = inside - dr.safe_sqrt(dr.fma(inside, inside, -square))
+    return 0.5 * dr.select(down, deeper, outer)

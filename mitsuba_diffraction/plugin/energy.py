@@ -154,11 +154,8 @@ class EnergyModel:
 
     def scale(self, height_scale: float) -> DirectionalTable | None:
         """Return s on `FINE`, for shaders; None where all values are 1."""
-
-        def fine(energy: Energy, found: Conservation) -> list[DirectionalTable] | None:
-            return found.scales and [side.on(FINE) for side in found.scales]
-
-        return self._tabulated(fine, height_scale) if self.conserving else None
+        found = self._tabulated(_scales_of, height_scale) if self.conserving else None
+        return None if found is None else found.on(FINE)
 
     def excess(self, height_scale: float) -> DirectionalTable | None:
         """Return the table of `albedo_excess`, for shaders; None without `beneath`."""

@@ -5,7 +5,6 @@ Hides the difference between JIT and scalar variants.
 
 from __future__ import annotations
 
-import functools
 import weakref
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -27,10 +26,9 @@ Shared = TypeVar("Shared")
 
 
 def once_a_table(make: Callable[[Table], Shared]) -> Callable[[Table], Shared]:
-    """Let all BSDFs of a table share the result of a function, in each variant's memory."""
+    """Let all BSDFs of a table share what is made of it, in each variant's memory."""
     made: weakref.WeakKeyDictionary[Any, dict[str, Shared]] = weakref.WeakKeyDictionary()
 
-    @functools.wraps(make)
     def shared(table: Table) -> Shared:
         variants = made.setdefault(table, {})
         if mi.variant() not in variants:

@@ -18,7 +18,7 @@ from ..llvm import require_loaded_llvm
 from ..optics.boundary import MODELS
 from ..optics.materials import PERFECT, TISSUES, index_at_sodium, material_named
 from ..retired import retired
-from ..settings import COHERENCES, SURFACE
+from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE
 from ..tables import DiffractionTable
 from .arithmetic import plain
 from .description import Feature
@@ -37,8 +37,6 @@ SOURCES = ("filename", "data")
 #: Earlier names of parameters, which are accepted with one line.
 EARLIER = {"heightfield": "filename", "table": "filename"}
 READING = tuple(field.name for field in fields(LoadOptions))
-#: Settings of the table.
-TABLE = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows")
 #: Parameters of coherence='surface'.
 PLACING = ("uv_scale", "world_scale", "tiling")
 #: Layers, pigment and medium that "none" leaves out, so that a scene can have a parameter for them.
@@ -59,8 +57,9 @@ ROUGH = 45.0
 
 REFLECTING, TRANSMITTING = PLUGINS
 _COMMON = (
-    *SOURCES, *READING, *TABLE, "int_ior", "ext_ior", "model", "orientation", "height_scale",
-    "height_scale_max", "lateral_scale", "lateral_scale_max", "wavelength", "energy_conserving",
+    *SOURCES, *READING, *SCENE_SETTINGS, "int_ior", "ext_ior", "model", "orientation",
+    "height_scale", "height_scale_max", "lateral_scale", "lateral_scale_max", "wavelength",
+    "energy_conserving",
 )  # fmt: skip
 #: Names of the parameters of each plugin.
 NAMES: Mapping[str, tuple[str, ...]] = {

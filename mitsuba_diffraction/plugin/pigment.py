@@ -18,15 +18,13 @@ from ..images import FORMATS
 from ..limits import check_content
 from ..optics.colour import decode_srgb
 from ..text_spectra import SPECTRA, choice_of, read_shares
+from .conductors import extended
 from .types import BSDF
 
 #: Wavelengths that a measured reflectance has to cover, nm; beyond its ends it is constant.
 REQUIRED = (400.0, 700.0)
 #: Suffixes of pictures, which texture coordinates lay over the surface.
 PICTURES = (".png", ".jpg", ".jpeg", ".exr")
-
-# Wavelengths, nm, to which a spectrum is continued at either end.
-_ENDS = (100.0, 10000.0)
 
 
 def pigment_bsdf(text: str | float) -> BSDF:
@@ -89,12 +87,10 @@ def _reflectance(text: str) -> dict[str, Any]:
                 f"pigment='{text}' is known from {lam[0]:g} to {lam[-1]:g} nm, and light from "
                 f"{REQUIRED[0]:g} to {REQUIRED[1]:g} nm needs it; give a longer spectrum"
             )
-        lam = np.array([_ENDS[0], *lam, _ENDS[1]])
-        value = np.array([value[0], *value, value[-1]])
         if not value.any():
             return {"type": "uniform", "value": 0.0}
-        pairs = list(zip(lam.tolist(), value.tolist(), strict=True))
-        return {"type": "spectrum", "value": pairs}
+        parts = (part.tolist() for part in extended(lam, value))
+        return {"type": "spectrum", "value": list(zip(*parts, strict=True))}
     if Path(text).suffix.lower() in PICTURES:
         return {"type": "bitmap", "filename": str(readable_file(text).absolute())}
     if Path(text).suffix.lower() in GLTF:

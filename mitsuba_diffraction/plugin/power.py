@@ -7,7 +7,6 @@ wavelengths, `rgb_power` those with colours.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -22,12 +21,8 @@ from .sampling import order_sampler
 from .types import Colour, Float, Index, Interaction, Mask, Powers, Vector2f
 from .window_positions import PlacedWindow, WindowPositions
 
-
-class PerWavenumber(NamedTuple):
-    """A function of 2π/λ, rad/µm, that returns a number of `values`."""
-
-    values: int
-    of: Callable[[Float], list[Float]]
+#: A function of 2π/λ, rad/µm.
+PerWavenumber = Callable[[Float], list[Float]]
 
 
 class SpectralPower:
@@ -63,13 +58,12 @@ class SpectralPower:
 
     def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
         """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
-        functions = [self._power(pair, height_scale, si)]
-        return _powers(self._each(functions, si, pair, height_scale)[0])
+        return _powers(self._each(*self._power(pair, height_scale, si), si, pair, height_scale))
 
     def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
         """Return the density of `draw` per solid angle, the mean over wavelengths."""
-        functions = [self._density(pair, height_scale)]
-        return _mean(self._each(functions, si, pair, height_scale)[0])
+        density = self._density(pair, height_scale)
+        return _mean(self._each(density, 1, si, pair, height_scale))
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
@@ -78,13 +72,15 @@ class SpectralPower:
 
         The density is computed first: the look-up of power evicts its small tables from the cache.
         """
-        functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale, si)]
-        densities, powers = self._each(functions, si, pair, height_scale)
-        return _powers(powers), _mean(densities)
+        density = self._density(pair.outer, drawing_scale)
+        power, count = self._power(pair, height_scale, si)
+        both = self._each(lambda k: [*density(k), *power(k)], 1 + count, si, pair, height_scale)
+        return _powers([powers for _, *powers in both]), _mean(both)
 
     def _power(
         self, pair: Pair | TablePoint, height_scale: Float, si: Interaction
-    ) -> PerWavenumber:
+    ) -> tuple[PerWavenumber, int]:
+        """Return a function whose values are those of `Powers`, and their number."""
         scaled_w = pair.w * height_scale
         if self._places is None or not isinstance(pair, Pair):
             windows: Sequence[PlacedWindow] = ()
@@ -96,8 +92,7 @@ class SpectralPower:
             unit, serves = dr.square(k * (0.5 / dr.pi)), self._serves(k)
             return [*(dr.select(serves, each * unit, 0.0) for each in sums[:2]), *sums[2:]]
 
-        interferes = bool(windows) or self.device.grid.coherent
-        return PerWavenumber(3 if interferes else 2, of_wavelength)
+        return of_wavelength, 3 if windows or self.device.grid.coherent else 2
 
     def _density(self, pair: Pair | PairThrough, height_scale: Float) -> PerWavenumber:
         def of_wavelength(k: Float) -> list[Float]:
@@ -105,7 +100,7 @@ class SpectralPower:
             density = self._sampler.density(k * pair.uv, strategy)
             return [density * pair.cos_o * pair.frame.area * dr.square(k)]
 
-        return PerWavenumber(1, of_wavelength)
+        return of_wavelength
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -160,12 +155,13 @@ class SpectralPower:
 
     def _each(
         self,
-        functions: Sequence[PerWavenumber],
+        function: PerWavenumber,
+        values: int,
         si: Interaction,
         pair: Pair | TablePoint | PairThrough,
         scale: Float,
-    ) -> list[list[list[Float]]]:
-        """Evaluate each function of k at each wavelength.
+    ) -> list[list[Float]]:
+        """Evaluate a function that returns so many values at each wavelength.
 
         A loop over wavelengths makes a smaller and faster kernel. It is unrolled where derivatives
         are wanted, which do not pass such loops, and in scalar variants, which have no kernel.
@@ -174,26 +170,19 @@ class SpectralPower:
         count = len(wavenumbers)
         differentiable = dr.grad_enabled(pair.uv, pair.w, pair.cos_i, pair.cos_o, scale)
         if differentiable or self.device.differentiable or count == 1 or not dr.is_jit_v(mi.Float):
-            return [[function.of(k) for k in wavenumbers] for function in functions]
+            return [function(k) for k in wavenumbers]
 
         def body(
-            n: Index, inputs: list[Float], values: list[list[list[Float]]]
-        ) -> tuple[Index, list[Float], list[list[list[Float]]]]:
-            added = [
-                [*earlier[1:], function.of(inputs[0])]
-                for earlier, function in zip(values, functions, strict=True)
-            ]
-            return n + 1, [*inputs[1:], inputs[0]], added
+            n: Index, inputs: list[Float], found: list[list[Float]]
+        ) -> tuple[Index, list[Float], list[list[Float]]]:
+            return n + 1, [*inputs[1:], inputs[0]], [*found[1:], function(inputs[0])]
 
-        nothing = [
-            [[mi.Float(0.0) for _ in range(function.values)] for _ in wavenumbers]
-            for function in functions
-        ]
+        nothing = [[mi.Float(0.0) for _ in range(values)] for _ in wavenumbers]
         state = (mi.UInt32(0), wavenumbers, nothing)
         # inactive lanes end at once: vectors without an active one skip the look-ups
         asked = mi.Mask(pair.asked)
         loop = dr.while_loop(state, lambda n, *_: (n < count) & asked, body)
-        return [list(values) for values in loop[2]]
+        return list(loop[2])
 
 
 def _powers(values: list[list[Float]]) -> Powers:
@@ -201,7 +190,8 @@ def _powers(values: list[list[Float]]) -> Powers:
 
 
 def _mean(values: list[list[Float]]) -> Float:
-    densities = [density for (density,) in values]
+    """Return the mean over wavelengths of the first value."""
+    densities = [density for density, *_ in values]
     return sum(densities[1:], densities[0]) * (1.0 / len(densities))
 
 

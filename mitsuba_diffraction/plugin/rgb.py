@@ -22,24 +22,29 @@ from .arithmetic import index_of, maximum, minimum
 from .directions import Pair, PairThrough, TablePoint
 from .memory import index_between, once_a_table, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
-from .series import series_interval, series_weights
+from .series import series_weights
 from .types import Buffer, Colour, Float, Index, Interaction, Powers, Vector2f
 
 
-class PolarCoordinates:
-    """Position of (u, v) between the rings and azimuths of a colour table."""
+class ColourLookup:
+    """A colour table in the memory of the current variant."""
 
     def __init__(self, table: ColourTable) -> None:
-        grid = table.grid
-        self.rings, self.step, self.smallest = grid.rings, grid.step, grid.smallest
-        starts = [grid.start(n) for n in range(grid.rings)]
-        self._starts = upload(mi.UInt32, np.array([*starts, grid.bins], np.uint32))
+        self.expansion, self.grid = table.expansion, table.grid
+        starts = [self.grid.start(n) for n in range(self.grid.rings)]
+        self._starts = upload(mi.UInt32, np.array([*starts, self.grid.bins], np.uint32))
+        self._inverse_scale = 1.0 / table.scale
+        self._radius_end = table.radius_end
+        self._radii, self._zs = table.order_0.shape[:2]
+        # not `HalfFloats`: dark colours are sums of subnormal numbers
+        self._coefficients = upload(mi.Float16, table.coefficients)
+        self._order_0 = upload(mi.Float, table.order_0)
 
     def ring(self, squared_radius: Float) -> Float:
         """Position among the rings; below 0 inside the smallest."""
-        smallest = self.smallest**2
+        smallest = self.grid.smallest**2
         logarithm = dr.log(maximum(squared_radius, 0.25 * smallest) * (1.0 / smallest))
-        return logarithm * (0.5 / self.step)
+        return logarithm * (0.5 / self.grid.step)
 
     def turn(self, uv: Vector2f) -> Float:
         """Azimuth in turns, 0 … 1."""
@@ -50,34 +55,17 @@ class PolarCoordinates:
         """Index of a ring's first bin."""
         return read(mi.UInt32, self._starts, ring)
 
-
-class ColourLookup:
-    """A colour table in the memory of the current variant."""
-
-    def __init__(self, table: ColourTable) -> None:
-        self.expansion = table.expansion
-        self.coordinates = PolarCoordinates(table)
-        self._bins = table.grid.bins
-        self._inverse_scale = 1.0 / table.scale
-        self._radius_end = table.radius_end
-        self._radii, self._zs = table.order_0.shape[:2]
-        # not `HalfFloats`: dark colours are sums of subnormal numbers
-        self._coefficients = upload(mi.Float16, table.coefficients)
-        self._order_0 = upload(mi.Float, table.order_0)
-
     def others(self, uv: Vector2f, z: Float) -> Colour:
         """Return the RGB of all orders but 0 in 1/µm², signed; z must not be beyond the table's."""
-        offset, interval = series_interval(self.expansion, z)
-        weights = series_weights(self.expansion, TERMS, offset, interval, z)
-        coordinates = self.coordinates
-        ring, t = _split(coordinates.ring(dr.squared_norm(uv)), coordinates.rings)
-        turn = coordinates.turn(uv)
-        starts = [coordinates.start(ring + n) for n in range(3)]
+        interval, weights = series_weights(self.expansion, TERMS, z)
+        ring, t = _split(self.ring(dr.squared_norm(uv)), self.grid.rings)
+        turn = self.turn(uv)
+        starts = [self.start(ring + n) for n in range(3)]
         total = [mi.Float(0.0)] * (3 * TERMS)
         for n, of_ring in ((0, 1.0 - t), (1, t)):
             count = starts[n + 1] - starts[n]  # one more than there are azimuths
             azimuth, a = _split(turn * (mi.Float(count) - 1.0), count)
-            bin_ = interval * self._bins + starts[n] + azimuth
+            bin_ = interval * self.grid.bins + starts[n] + azimuth
             for m, share in ((0, of_ring * (1.0 - a)), (1, of_ring * a)):
                 packet = read_record(self._coefficients, bin_ + m, PACKET)
                 total = [dr.fma(p, share, s) for p, s in zip(packet, total, strict=False)]
@@ -117,19 +105,13 @@ _LEAST = 1e-18
 
 
 class RGBPower:
-    """The `power.SpectralPower` of variants without wavelengths, which are summed.
+    """The `power.SpectralPower` of variants without wavelengths, which are summed."""
 
-    coherent : whether orders interfere.
-    """
-
-    def __init__(self, table: ColourTable, coherent: bool) -> None:
-        self._coherent = coherent
+    def __init__(self, summed: DiffractionTable) -> None:
+        self._coherent, table = summed.grid.coherent, cached_colours(summed)
         self._lookup = ColourLookup(table)
-        self._coordinates = self._lookup.coordinates
-        self._z_max = table.z_max
+        self._grid, self._z_max = table.grid, table.z_max
         proposals = colour_proposals(table)
-        self._rings, self._bins = proposals.rings.shape[1], table.grid.bins
-        self._most = max(table.grid.counts)
         self._ring_sums = upload(mi.Float, proposals.rings)
         self._azimuth_sums = upload(mi.Float, proposals.azimuths)
         self._occupied = upload(mi.Float, proposals.occupied.astype("float32"))
@@ -185,17 +167,16 @@ class RGBPower:
         for sharpness in self._sharpness:
             lobe = dr.exp(-sharpness * squared_radius) * (sharpness / dr.pi)
             glossy += lobe * (1.0 / len(self._sharpness))
-        position = self._coordinates.ring(squared_radius)
-        inside = (position >= 0.0) & (position < self._rings - 1.0)
+        position = self._lookup.ring(squared_radius)
+        inside = (position >= 0.0) & (position < self._grid.rings - 1.0)
         position = dr.select(inside, position, 0.0)
-        ring = dr.minimum(mi.UInt32(position), self._rings - 2)
+        ring = dr.minimum(mi.UInt32(position), self._grid.rings - 2)
         start, count = self._ring(ring)
-        azimuth = dr.minimum(mi.UInt32(self._coordinates.turn(uv) * mi.Float(count)), count - 1)
-        cell = self._difference(self._ring_sums, band * self._rings + ring) * self._difference(
-            self._azimuth_sums, band * self._bins + start + azimuth
-        )
+        azimuth = dr.minimum(mi.UInt32(self._lookup.turn(uv) * mi.Float(count)), count - 1)
+        cell = self._difference(self._ring_sums, band * self._grid.rings + ring)
+        cell *= self._difference(self._azimuth_sums, band * self._grid.bins + start + azimuth)
         # A cell is step·2π/count wide in ln r and φ, and r² d(ln r) dφ = du dv
-        area = squared_radius * (self._coordinates.step * 2.0 * dr.pi)
+        area = squared_radius * (self._grid.step * 2.0 * dr.pi)
         cell = dr.select(inside, cell * mi.Float(count) / dr.select(inside, area, 1.0), 0.0)
         return dr.lerp(cell, glossy, share)
 
@@ -211,15 +192,12 @@ class RGBPower:
         for n, sharpness in enumerate(self._sharpness):
             width = dr.select(lobe == n, math.sqrt(0.5 / sharpness), width)
         glossy = mi.warp.square_to_std_normal(sample2) * width
-        ring, t = invert(
-            self._ring_sums, band * self._rings, self._rings - 1, self._rings, sample2.y
-        )
+        grid = self._grid
+        ring, t = invert(self._ring_sums, band * grid.rings, grid.rings - 1, grid.rings, sample2.y)
         start, count = self._ring(ring)
-        azimuth, a = invert(
-            self._azimuth_sums, band * self._bins + start, count, self._most, sample2.x
-        )
-        coordinates = self._coordinates
-        radius = coordinates.smallest * dr.exp((mi.Float(ring) + t) * coordinates.step)
+        first, most = band * grid.bins + start, max(grid.counts)
+        azimuth, a = invert(self._azimuth_sums, first, count, most, sample2.x)
+        radius = grid.smallest * dr.exp((mi.Float(ring) + t) * grid.step)
         sin, cos = dr.sincos((mi.Float(azimuth) + a) * (2.0 * dr.pi) / mi.Float(count))
         return dr.select(
             sample1 < share, mi.Vector2f(glossy), mi.Vector2f(radius * cos, radius * sin)
@@ -237,14 +215,12 @@ class RGBPower:
 
     def _ring(self, ring: Index) -> tuple[Index, Index]:
         """First bin of a ring, and its azimuths."""
-        start = self._coordinates.start(ring)
-        return start, self._coordinates.start(ring + 1) - start - 1
+        start = self._lookup.start(ring)
+        return start, self._lookup.start(ring + 1) - start - 1
 
     def _difference(self, sums: Buffer, index: Index) -> Float:
         return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)
 
 
-@once_a_table
-def rgb_power(table: DiffractionTable) -> RGBPower:
-    """Return the colours in the current variant's memory."""
-    return RGBPower(cached_colours(table), table.grid.coherent)
+#: The colours of a table in the current variant's memory.
+rgb_power = once_a_table(RGBPower)

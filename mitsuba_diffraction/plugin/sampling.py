@@ -15,6 +15,7 @@ cosθo does not.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import drjit as dr
@@ -152,9 +153,16 @@ def direction_of(tangential: Vector2f) -> Vector3f:
     return mi.Vector3f(tangential.x, tangential.y, cos)
 
 
-def with_even_share(density: Float, even: Float = EVEN) -> Float:
-    """The density of drawing a direction by the orders, and a little evenly."""
-    return dr.lerp(density, dr.inv_two_pi, even)
+def drawn(by_orders: Callable[[Float], Vector3f], sample1: Float, sample2: Vector2f) -> Vector3f:
+    """Draw a direction by the orders, from what a share of `sample1` leaves, or a few evenly."""
+    remaining = dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0)
+    even = mi.warp.square_to_uniform_hemisphere(sample2)
+    return dr.select(sample1 < EVEN, even, by_orders(remaining))
+
+
+def with_even_share(density: Float) -> Float:
+    """Return the density of `drawn` from the density of drawing by the orders."""
+    return dr.lerp(density, dr.inv_two_pi, EVEN)
 
 
 def invert(
@@ -179,7 +187,5 @@ def invert(
     return index, clip((sample - lower) / width, 0.0, 1.0)
 
 
-@once_a_table
-def order_sampler(table: DiffractionTable) -> OrderSampler:
-    """Return the sampler in the current variant's memory."""
-    return OrderSampler(table)
+#: The sampler of a table in the current variant's memory.
+order_sampler = once_a_table(OrderSampler)

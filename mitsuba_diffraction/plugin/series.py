@@ -55,8 +55,7 @@ class Recurrence:
 
     def at(self, kappa: Float) -> SeriesValue:
         """Evaluate the series at κ in rad/µm."""
-        offset, interval = series_interval(self._expansion, kappa)
-        weights = series_weights(self._expansion, self._record.stored, offset, interval, kappa)
+        interval, weights = series_weights(self._expansion, self._record.stored, kappa)
         values = read_record(self._order_0, interval, self._record.numbers)
         order_0 = [inner(part, weights) for part in self._record.split(values)]
         factored = mi.Mask(True) if self._expansion.basis == "taylor" else interval == 0
@@ -113,30 +112,24 @@ def series_of(table: DiffractionTable) -> Recurrence | Tabulated:
     return Recurrence(table) if table.expansion.functions is None else Tabulated(table)
 
 
-def series_interval(expansion: Expansion, kappa: Float) -> tuple[Float, Index]:
-    """Position of κ in its interval (0 … 1), and the interval."""
+def series_weights(expansion: Expansion, terms: int, kappa: Float) -> tuple[Index, list[Float]]:
+    """Interval of κ, and the factor of each term of its Chebyshev or Taylor series."""
     position = kappa * (1.0 / expansion.length)
     lower = index_between(dr.floor(position), 0.0, expansion.intervals - 1.0)
-    return position - lower, index_of(lower)
-
-
-def series_weights(
-    expansion: Expansion, terms: int, offset: Float, interval: Index, kappa: Float
-) -> list[Float]:
-    """Factor of each term of a Chebyshev or Taylor series; `offset` is 0 … 1."""
+    offset, interval = position - lower, index_of(lower)
     if expansion.basis == "taylor":
         x = kappa * expansion.half_range
         weights = [x]
         for n in range(2, terms + 1):
             weights.append(weights[-1] * x * (1.0 / n))
-        return weights
+        return interval, weights
     t = clip(dr.fma(2.0, offset, -1.0), -1.0, 1.0)
     factor = offset if expansion.kind == "amplitude" else dr.square(offset)
     scale = dr.select(interval == 0, factor, 1.0)
     weights = [scale, scale * t]  # Tₙ(t) by their recurrence, the factor carried along
     while len(weights) < terms:
         weights.append(dr.fma(2.0 * t, weights[-1], -weights[-2]))
-    return weights[:terms]
+    return interval, weights[:terms]
 
 
 def inner(terms: Sequence[Float], weights: Sequence[Float]) -> Float:

@@ -18,12 +18,12 @@ from ..heights.lengths import is_auto
 from ..heights.preprocess import fill_missing
 from ..heights.read import fill_method, treat
 from ..progress import show
-from ..settings import SURFACE, checked
+from ..settings import SCENE_SETTINGS, SURFACE, checked
 from ..tables import DiffractionTable, TableSource, providing
 from ..tables.source import loaded_table
 from .dictionary import Data
 from .parameter_changes import GivenHeights
-from .parameters import READING, SOURCES, TABLE, coherence_of, resolved_path
+from .parameters import READING, SOURCES, coherence_of, resolved_path
 from .types import Properties
 
 #: Mitsuba samples its spectral variants' wavelengths from here on, nm.
@@ -54,7 +54,7 @@ def read_patch(props: Properties, height_scale: float, stretch: float) -> Patch:
         )
     (name,) = names
     options = LoadOptions.parse(**{name: props.get(name) for name in READING if name in props})
-    given = {name: props.get(name) for name in TABLE if name in props}
+    given = {name: props.get(name) for name in SCENE_SETTINGS if name in props}
     if coherence_of(props) == SURFACE:
         given["coherence"] = "patch"  # each window has its own speckle
     if is_auto(given.get("coherence_width", 0.0)):
@@ -159,8 +159,35 @@ def _check_table(
     table: DiffractionTable, shown: str, options: LoadOptions, asked: Mapping[str, Any],
     height_scale: float, stretch: float,
 ) -> None:  # fmt: skip
-    """Refuse parameters of the scene that contradict a table, or are beyond it."""
-    _check_agreement(shown, table, options, asked)
+    """Refuse parameters of a scene that contradict its table, or are beyond it."""
+    tabulated = {
+        "coherence_width": table.coherence_width,
+        "coherence": table.coherence,
+        "basis": table.expansion.basis,
+        "tolerance": table.tolerance,
+        "terms": table.expansion.terms,
+        "windows": table.settings.windows,
+    }
+    for name, value in asked.items():
+        if value != tabulated[name] and not (name == "basis" and value == "auto"):
+            # which scenes have as a parameter of their own
+            auto = ", or say coherence_width=auto" if name == "coherence_width" else ""
+            raise DiffractionError(
+                f"{name}={value} contradicts the table '{shown}', which has "
+                f"{name}={tabulated[name]}; leave it out{auto}, or build another table with "
+                f"{name}={value} (the command 'precompute')"
+            )
+    for name, value in options.specified().items():
+        raise DiffractionError(
+            f"{name}={value} is for height fields, but '{shown}' is a table and has its own; "
+            f"leave {name} out, or say 'auto'"
+        )
+    if not mi.is_monochromatic and table.wavelength_range[0] > SHORTEST_WAVELENGTH:
+        raise DiffractionError(
+            f"the table '{shown}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
+            f"from {SHORTEST_WAVELENGTH:g} nm on; build it with "
+            "wavelength_range=(360, 830) (the command 'precompute')"
+        )
     if stretch > 1.0:
         raise DiffractionError(
             f"lateral_scale={stretch:g} is above 1, beyond the frequencies of the table "
@@ -172,42 +199,4 @@ def _check_table(
             "coat counts as its index times the heights); give the height field instead of the "
             f"table, or build the table with height_scale_max={height_scale:.4g} or more (the "
             "command 'precompute')"
-        )
-
-
-def _remedy(name: str) -> str:
-    if name == "coherence_width":  # which scenes have as a parameter of their own
-        return "leave it out, or say coherence_width=auto"
-    return "leave it out"
-
-
-def _check_agreement(
-    path: str, table: DiffractionTable, options: LoadOptions, asked: Mapping[str, Any]
-) -> None:
-    """Refuse parameters of a scene that contradict its table, which fixes them."""
-    tabulated = {
-        "coherence_width": table.coherence_width,
-        "coherence": table.coherence,
-        "basis": table.expansion.basis,
-        "tolerance": table.tolerance,
-        "terms": table.expansion.terms,
-        "windows": table.settings.windows,
-    }
-    for name, value in asked.items():
-        if value != tabulated[name] and not (name == "basis" and value == "auto"):
-            raise DiffractionError(
-                f"{name}={value} contradicts the table '{path}', which has "
-                f"{name}={tabulated[name]}; {_remedy(name)}, or build another table with "
-                f"{name}={value} (the command 'precompute')"
-            )
-    for name, value in options.specified().items():
-        raise DiffractionError(
-            f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
-            f"leave {name} out, or say 'auto'"
-        )
-    if not mi.is_monochromatic and table.wavelength_range[0] > SHORTEST_WAVELENGTH:
-        raise DiffractionError(
-            f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
-            f"from {SHORTEST_WAVELENGTH:g} nm on; build it with "
-            "wavelength_range=(360, 830) (the command 'precompute')"
         )

@@ -14,7 +14,7 @@ from ..tables.build.derivatives import missing
 from . import parameters as read
 from .arithmetic import plain
 from .base import SurfaceBSDF
-from .boundary import KIRCHHOFF, Boundary, boundary_of
+from .boundary import KIRCHHOFF, Boundary, boundary_of, order_0
 from .conductors import tabulated_range
 from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
@@ -108,16 +108,6 @@ class DiffractingSurface(SurfaceBSDF):
         self.parameters += [each for owner in owners for each in owner.changeable]
         super().ready()
 
-    @property
-    def sigma(self) -> float:
-        """Standard deviation of the amplitude window, µm."""
-        return self.table.sigma
-
-    @property
-    def mean_table(self) -> Any:
-        """Table of the mean over all positions of the window."""
-        return self.table if self.window_positions is None else self.table.averaged
-
     # ------------------------------------------------------------------ the model
 
     def geometry(self, pair: Pair) -> Float:
@@ -146,7 +136,7 @@ class DiffractingSurface(SurfaceBSDF):
         factor = boundary.factor(pair, site.scale, site.wavenumbers, indices, ctx.mode)
         level = mi.Spectrum(power.others * (self.geometry(pair) * shadowing))
         others = dr.select(active, tinted(level * factor, boundary.material), 0.0)
-        mirror = self.mirrored(ctx, site, pair, boundary, indices, power.zeroth, active)
+        mirror = self.mirrored(ctx, site, pair, boundary.material, indices, power.zeroth, active)
         return interfering(others, mirror, power.cosine)
 
     def material_factor(self, pair: Pair, site: Site) -> tuple[Spectrum, Float]:
@@ -167,7 +157,7 @@ class DiffractingSurface(SurfaceBSDF):
         ctx: Context,
         site: Site,
         pair: Pair,
-        boundary: Boundary,
+        material: Material,
         indices: list[Number],
         zeroth: Colour,
         active: Mask,
@@ -181,17 +171,17 @@ class DiffractingSurface(SurfaceBSDF):
         level = zeroth * (self.area_factor * pair.frame.area * pair.outer.cos_o)
 
         def reflected() -> Spectrum:
-            factor = boundary.mirror(pair, site.wavenumbers, width, indices, ctx.mode)
-            return tinted(mi.Spectrum(level) * factor, boundary.material)
+            factor = order_0(material, pair, site.wavenumbers, width, indices, ctx.mode)
+            return tinted(mi.Spectrum(level) * factor, material)
 
         return only_in(active & dr.any(level != 0.0), reflected)  # the lobe is narrow
 
     def face(
-        self, ctx: Context, site: Site, pair: Pair, mirror: Boundary, active: Mask
+        self, ctx: Context, site: Site, pair: Pair, material: Material, active: Mask
     ) -> Spectrum:
         """Return f cosθo of a flat face."""
-        indices, flat = mirror.material.indices(site.si, active), self.power.flat(pair, site.si)
-        return self.mirrored(ctx, site, pair, mirror, indices, flat, active)
+        indices, flat = material.indices(site.si, active), self.power.flat(pair, site.si)
+        return self.mirrored(ctx, site, pair, material, indices, flat, active)
 
     def reflected_share(self, site: Site, active: Mask) -> Colour:
         """See `SurfaceBSDF.reflected_share`."""
@@ -235,9 +225,10 @@ class DiffractingSurface(SurfaceBSDF):
         if self.given is not None and (patch := self.given.made()) is not None:
             self.table, self.heights = patch.table, patch.heights
             self.power = self._power()
-            self.boundary.take(self.table.roughness)
+            self.boundary = self.boundary.on(self.table.roughness)
         self.fresnel.derive()
-        self.energy.update(self.mean_table, self.scale_range())
+        mean = self.table if self.window_positions is None else self.table.averaged
+        self.energy.update(mean, self.scale_range())
 
     def _power(self) -> PowerModel:
         heights = None
@@ -294,7 +285,6 @@ class DiffractingSurface(SurfaceBSDF):
             heights=self.heights,
             height_scale=self.height_scale.quantity,
             lateral_scale=self.lateral_scale.quantity,
-            largest_scale=float(self.table.height_scale_max),
             kind=material.kind,
             index=None if material.kind is Feature.MIRROR else material.at,
             material=material.name if tabulated_range(material.name) else "",
@@ -303,11 +293,6 @@ class DiffractingSurface(SurfaceBSDF):
             model=str(self.boundary),
             transmits=self.transmits,
         )
-
-    @property
-    def model(self) -> str:
-        """Name of the boundary model, for people."""
-        return str(self.boundary)
 
     def shown(self) -> dict[str, Any]:
         """See `PluginBSDF.shown`."""
@@ -321,7 +306,7 @@ class DiffractingSurface(SurfaceBSDF):
             **placed,
             "tolerance": f"{self.table.tolerance:g}",
             "surface": self.fresnel,
-            "model": self.model,
+            "model": str(self.boundary),
             "height_scale": self.height_scale,
             "energy_conserving": "true" if self.energy_conserving else "false",
             "orientation": self.orientation,

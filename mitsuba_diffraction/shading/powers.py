@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..tables import DiffractionTable
 from ..tables.expansion import Expansion
 from ..tables.layout import BinRecord, cells_of, functions_at
-from ..tables.powers import order_0_power, power_series
+from ..tables.powers import as_powers, order_0_power
 
 #: Phase over a cell of κ, within which factors are interpolated linearly; the error is its square
 #: over 8, 1e-4.
@@ -52,13 +52,15 @@ def pack_powers(table: DiffractionTable, cell: float = CELL) -> PackedPowers:
 
     cell : phase over a cell of κ, rad.
     """
-    series, _, scale, expansion = power_series(table)
+    table.require_whole("a list of powers is made of")
+    powers = as_powers(table)
+    series, expansion = powers.coefficients, powers.expansion
     record = BinRecord.of(1, expansion.terms, unit=4)
-    orders = record.pack(series[..., None, :]).reshape(*series.shape[:3], record.stored)
+    orders = record.pack(series).reshape(*series.shape[:3], record.stored)
     cells = cells_of(expansion, cell)
     share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
     kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + share)
     factors = np.zeros((*kappa.shape, record.stored + 4), np.float32)
     factors[..., : expansion.terms] = functions_at(expansion, kappa)
     factors[..., record.stored] = order_0_power(table, kappa)
-    return PackedPowers(orders, factors.reshape(*kappa.shape, -1, 4), scale, expansion)
+    return PackedPowers(orders, factors.reshape(*kappa.shape, -1, 4), powers.scale, expansion)

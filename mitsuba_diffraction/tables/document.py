@@ -31,7 +31,6 @@ MAX_BYTES = 4 << 30
 _REQUIRED = ("coherence_width", "coherence", "tolerance", "wavelength_range", "height_scale_max")
 _SETTINGS = tuple(field.name for field in dataclasses.fields(TableSettings))
 _TABLE_FIELDS = ("scale", "spacing", "error", "roughness", "source", "expansion", "grid", "order_0")
-_COMPONENTS = {"power": 1, "amplitude": 2}
 _MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
 _MOST_SERIES = 1 << 16  # terms over all intervals
 _MOST_NODES = 1 << 12
@@ -98,7 +97,7 @@ def _present(record: Expansion | Grid) -> dict[str, Any]:
 def shape_of(table: DiffractionTable) -> tuple[int, ...]:
     """Return the shape of a table's coefficients, which it may lack."""
     expansion = table.expansion
-    return expansion.intervals, *table.grid.shape, _COMPONENTS[expansion.kind], expansion.terms
+    return expansion.intervals, *table.grid.shape, expansion.components, expansion.terms
 
 
 def with_coefficients(table: DiffractionTable, coefficients: NDArray[Any]) -> DiffractionTable:
@@ -123,10 +122,10 @@ def parse_document(document: Any) -> DiffractionTable:
     settings = _settings(fields)
     check_names(fields, (*_TABLE_FIELDS, *_SETTINGS), _TABLE_FIELDS)
     expansion = _expansion(mapping(fields["expansion"], "expansion"))
-    components = _COMPONENTS[expansion.kind], expansion.series_terms
+    order_0 = expansion.intervals, expansion.components, expansion.series_terms
     table = DiffractionTable(
         coefficients=np.zeros((0, 0, 0, 0, 0), np.float32),
-        order_0=numbers(fields["order_0"], "order_0", (expansion.intervals, *components)),
+        order_0=numbers(fields["order_0"], "order_0", order_0),
         scale=number(fields["scale"], "scale", 1e-30, 1e30),
         expansion=expansion,
         grid=_grid(mapping(fields["grid"], "grid")),
@@ -253,6 +252,5 @@ def _check_sizes(coefficients: NDArray[Any], expansion: Expansion, scale: float)
         part = coefficients[interval, start : start + rows].astype(np.float32)
         with np.errstate(all="ignore"):
             values = series_sum(part, weights.astype(np.float32))
-            powers = values[..., 0] if expansion.kind == "power" else (values**2).sum(axis=-1)
-        largest = float(np.abs(powers).max())
+            largest = float(np.abs(expansion.power_of(values)).max())
         require(largest <= _LARGEST_POWER, f"an order with {largest:.3g} of the light")

@@ -29,6 +29,7 @@ cancel, which single precision survives for shallow surfaces only.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import scipy
@@ -65,6 +66,15 @@ class Expansion:
     kappa_max: float
     half_range: float
     functions: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def components(self) -> int:
+        """Numbers of an order at one κ: its power, or the two parts of its amplitude."""
+        return 1 if self.kind == "power" else 2
+
+    def power_of(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the powers of orders from their numbers (…, components)."""
+        return np.asarray(values[..., 0] if self.kind == "power" else np.sum(values**2, axis=-1))
 
     @property
     def series_terms(self) -> int:

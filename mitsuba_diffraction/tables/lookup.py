@@ -191,7 +191,7 @@ def _bin_value(table: DiffractionTable, values: NDArray[np.float64]) -> NDArray[
     """Return the power or the complex amplitude, (n,), of numbers stored in a table."""
     if table.grid.coherent:
         return values[:, 0] + 1j * values[:, 1]
-    return np.asarray(np.sum(values**2, axis=1) if len(values.T) == 2 else values[:, 0])
+    return table.expansion.power_of(values)
 
 
 def _phases(

@@ -234,9 +234,8 @@ class _Powers:
             # order 0 is the mean's lobe, or all light where the speckle is darker than that
             order_0 = np.minimum(order_0, total)
             return total - order_0, float(order_0.sum()), np.zeros_like(total)
-        of_power = expansion.kind == "power"
         # a scan's sharpened powers may be below 0, and their sum is right
-        power = parts[..., 0] if of_power else np.sum(parts**2, axis=-1)
+        power = expansion.power_of(parts)
         if len(axes[0].frequency) < nx:
             power = power @ axes[0].matrix.T
         if len(axes[1].frequency) < ny:

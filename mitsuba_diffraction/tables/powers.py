@@ -46,10 +46,7 @@ def fitted(expansion: Expansion, values_at: Callable[[float], NDArray[Any]]) -> 
 
 def order_0_power(table: DiffractionTable, kappa: ArrayLike) -> NDArray[np.float64]:
     """|a_0(κ)|², the shape of κ."""
-    parts = table.order_0_at(kappa)
-    if table.expansion.kind == "power":
-        return np.asarray(np.maximum(parts[..., 0], 0.0))
-    return np.asarray(np.sum(parts**2, axis=-1))
+    return np.maximum(table.expansion.power_of(table.order_0_at(kappa)), 0.0)
 
 
 def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
@@ -60,9 +57,7 @@ def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
     interval = int(table.expansion.interval(kappa))
     weights = (table.expansion.weights(kappa) / table.scale).astype(np.float32)
     parts = series_sum(table.coefficients[interval].astype(np.float32), weights)
-    if table.expansion.kind == "power":
-        return np.asarray(parts[..., 0])
-    return np.asarray(np.sum(parts**2, axis=-1))
+    return table.expansion.power_of(parts)
 
 
 def scattered_share(table: DiffractionTable, wavelength: float) -> float:
@@ -100,20 +95,3 @@ def as_powers(table: DiffractionTable) -> DiffractionTable:
         table, coefficients=coefficients[:, :, :, None], order_0=order_0[:, None], scale=1.0,
         expansion=new,
     )  # fmt: skip
-
-
-def power_series(
-    table: DiffractionTable,
-) -> tuple[NDArray[np.floating], NDArray[np.float64], float, Expansion]:
-    """The series of `as_powers`, of a table with all orders.
-
-    Returns
-    -------
-    coefficients : (intervals, ny, nx, terms), to be divided by the scale; order 0 is zero.
-    order_0 : (intervals, series_terms) of order 0, less 1 in the first interval.
-    scale, expansion
-    """
-    table.require_whole("a list of powers is made of")
-    powers = as_powers(table)
-    coefficients, order_0 = powers.coefficients[:, :, :, 0], powers.order_0[:, 0]
-    return coefficients, order_0, powers.scale, powers.expansion

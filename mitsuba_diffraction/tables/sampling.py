@@ -153,7 +153,7 @@ def _cell_power(
                 amplitude = parts[..., 0] + 1j * parts[..., 1]
                 total = total + np.abs(apply_window(matrices, amplitude)) ** 2
             else:
-                total = total + apply_window(matrices, np.sum(parts**2, axis=2))
+                total = total + apply_window(matrices, expansion.power_of(parts))
     return np.asarray(total, float)
 
 

@@ -31,7 +31,7 @@ def base() -> Surface:
     table = md.DiffractionTable.build(PATCH, **DEFAULTS)
     return Surface(
         table, "dielectric", DEFAULTS["coherence_width"], Quantity(0.0), kind=Feature.DIELECTRIC,
-        index=constant(1.5), model="small_slope", largest_scale=1.5,
+        index=constant(1.5), model="small_slope",
     )  # fmt: skip
 
 

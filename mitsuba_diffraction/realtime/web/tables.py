@@ -17,7 +17,7 @@ from ...plugin.description import Surface
 from ...shading import orders
 from ...tables import DiffractionTable
 from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
-from ...tables.powers import power_series, powers_at
+from ...tables.powers import as_powers, powers_at
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import pack_orders
@@ -64,11 +64,7 @@ def _modelled(method: str, table: DiffractionTable, digits: int) -> Rounded:
         coefficients = shortened(rounded(colours.coefficients, digits, FLOOR)).astype(np.float16)
         fewer = replace(colours, coefficients=coefficients)
         return pack_colours(fewer), colour_difference(colours, fewer)
-    series, order_0, scale, expansion = power_series(table)
-    powers = replace(
-        table, coefficients=series[:, :, :, None], order_0=order_0[:, None], scale=scale,
-        expansion=expansion,
-    )  # fmt: skip
+    powers = as_powers(table)
     less = replace(powers, coefficients=rounded(powers.coefficients, digits, FLOOR))
     return pack_powers(less), power_colour_difference(powers, less)
 

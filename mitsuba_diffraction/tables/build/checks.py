@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -74,7 +75,8 @@ def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
             f"of {extent[0]:.4g} × {extent[1]:.4g} µm; check both units, or give a larger patch "
             "(of a grating: more periods)"
         )
-    taps = expected_taps(extent, settings)
+    x, y = (sigma_of(settings.lookup_width) * 2.0 * np.pi / length for length in extent)
+    taps = taps_for((x, y), settings.tolerance * TAPS_SHARE, settings.coherent)
     if settings.taps is None and max(taps) > MAX_TAPS:
         raise too_wide(extent, settings, taps)
 
@@ -85,12 +87,6 @@ def period_of(field: HeightField, settings: TableSettings) -> tuple[float, float
         return field.extent
     x, y = (2.0 * max(settings.width, 2.0 * pixel) for pixel in field.pixel_size)
     return x, y
-
-
-def expected_taps(extent: tuple[float, float], settings: TableSettings) -> tuple[int, int]:
-    """Return the orders (x, y) that a look-up will probably read, for a patch this large, µm."""
-    x, y = (sigma_of(settings.lookup_width) * 2.0 * np.pi / length for length in extent)
-    return taps_for((x, y), settings.tolerance * TAPS_SHARE, settings.coherent)
 
 
 def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[str]:
@@ -129,10 +125,8 @@ def too_wide(
 
 def check_size(grid: Grid, expansion: Expansion, functions: int | None) -> None:
     """Refuse a table that exceeds the memory; `functions` counts functions of basis "svd"."""
-    components = 1 if expansion.kind == "power" else 2
-    bins = (2 * grid.last[0] + 1) * (2 * grid.last[1] + 1)
-    terms = functions or expansion.terms
-    size = 4 * bins * components * terms * expansion.intervals
+    bins, terms = math.prod(grid.shape), functions or expansion.terms
+    size = 4 * bins * expansion.components * terms * expansion.intervals
     if size > MAX_BYTES:
         raise build_error(
             f"it would take {size / 1e9:.1f} GB ({bins:.3g} orders of {expansion.intervals}×"

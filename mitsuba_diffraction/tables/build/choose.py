@@ -212,9 +212,7 @@ class _Trial:
                 table, truth = bins @ (weights @ series), self._values(kappa, expansion)
                 table[self._centre] = order_0 @ weights
                 table[*self._centre, 0] += specular
-                if expansion.kind == "amplitude":
-                    table, truth = table**2, truth**2
-                table, truth = table.sum(axis=-1), truth.sum(axis=-1)
+                table, truth = expansion.power_of(table), expansion.power_of(truth)
                 errors.append(self._parts(np.abs(table - truth)))
                 exact.append(self._parts(truth))
         scale = np.maximum(exact, FLOOR * np.max(exact, axis=0))

@@ -39,8 +39,8 @@ def coefficients_of(
     """
     if expansion.basis == "taylor":
         return Coefficients(*_taylor(spectra, grid, expansion), expansion)
-    components = 1 if expansion.kind == "power" else 2
-    terms, near = functions or expansion.terms, _near(grid, components)
+    components, terms = expansion.components, functions or expansion.terms
+    near = _near(grid, components)
     inner = _inner(spectra, grid)
     shape = *grid.shape, components
     result = np.empty((expansion.intervals, *shape, terms), np.float32)

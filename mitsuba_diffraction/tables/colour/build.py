@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
 from ..expansion import Expansion, series_sum
-from ..powers import fitted, order_0_power, power_expansion, power_series
+from ..powers import as_powers, fitted, order_0_power, power_expansion
 from ..table import DiffractionTable
 from ..window import taps_at
 
@@ -161,13 +161,10 @@ class OtherOrders:
 
     def __init__(self, table: DiffractionTable) -> None:
         self._lobe = lobe_of(table)
-        self._table, bins = table, table.coefficients
-        self._shape = bins.shape[1:3]
-        self._scale, self._expansion = table.scale, power_expansion(table)
-        if not table.grid.coherent:
-            powers, _, self._scale, self._expansion = power_series(table)
-            bins = powers[:, :, :, None]
-        flat = np.ascontiguousarray(np.moveaxis(bins, 0, 2), np.float32)
+        stored = table if table.grid.coherent else as_powers(table)
+        self._table, self._shape, self._scale = table, table.grid.shape, stored.scale
+        self._expansion = power_expansion(table) if table.grid.coherent else stored.expansion
+        flat = np.ascontiguousarray(np.moveaxis(stored.coefficients, 0, 2), np.float32)
         self._bins = flat.reshape(self._shape[0] * self._shape[1], -1)
         self._smooth = tuple(taps > _MOST_TAPS for taps in table.grid.taps)
         for axis, exponent in enumerate(table.grid.exponents):
