@@ -330,7 +330,8 @@ def _ratio(int_ior: float | str, ext_ior: float | str) -> float:
             near = difflib.get_close_matches(name.lower(), {*TISSUES, *media.split(", ")}, 2)
             hint = f"did you mean {' or '.join(near)}? Or" if near else "choose"
             raise DiffractionError(
-                f"medium {name!r} is unknown; {hint} one of {media}; or give its index, e.g. 1.33"
+                f"int_ior={int_ior!r}, ext_ior={ext_ior!r}: medium {name!r} is unknown; {hint} one "
+                f"of {media}; or give its index, e.g. 1.33"
             ) from error
         raise DiffractionError(
             f"int_ior={int_ior!r}, ext_ior={ext_ior!r} is not a material that Mitsuba knows "

@@ -18,6 +18,9 @@ from ..settings import COHERENCES, SURFACE, TableSettings, checked
 from .model import Light
 from .screens import LOOKUP, Sigmas
 
+#: Most by which a unit vector's length may differ from 1: vectors of four digits do by less.
+_UNIT = 1e-3
+
 
 def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
     """Return σ and σ₀ of a checked coherence width; unlike a table's, it has no largest value."""
@@ -142,7 +145,7 @@ def index_of(
 
 
 def directions_of(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Light:
-    """Broadcast directions and wavelengths to one length."""
+    """Check that directions are unit vectors; broadcast them and wavelengths to one length."""
     incident, outgoing = np.atleast_2d(np.asarray(wi, float)), np.atleast_2d(np.asarray(wo, float))
     lam = np.atleast_1d(np.asarray(wavelength, float))
     if incident.shape[-1] != 3 or outgoing.shape[-1] != 3:
@@ -158,6 +161,14 @@ def directions_of(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Light:
             f"wi {np.shape(wi)}, wo {np.shape(wo)} and wavelength {np.shape(wavelength)} "
             "do not broadcast to one length n"
         ) from error
+    for name, vectors in (("wi", incident), ("wo", outgoing)):
+        lengths = np.linalg.norm(vectors, axis=-1).ravel()
+        wrong = lengths[~(np.abs(lengths - 1.0) <= _UNIT)]
+        if wrong.size:
+            raise DiffractionError(
+                f"{name} must be unit vectors, one has the length {wrong[0]:g}; divide each by its "
+                "length"
+            )
     return Light(
         np.broadcast_to(incident, (*n, 3)),
         np.broadcast_to(outgoing, (*n, 3)),

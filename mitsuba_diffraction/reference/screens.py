@@ -143,6 +143,8 @@ def sharpened(
     powers: Real, zeroth: tuple[NDArray[np.bool_], NDArray[np.bool_]], along: Tapers
 ) -> Real:
     """P_j from |a_j|² (ny, nx); zeroth : where q_j is 0 along y and x. Order 0 stays empty."""
+    if not powers.size:  # no order of the patch is near q
+        return powers
     empty = np.outer(*zeroth)
     axes = [axis for axis, taper in enumerate(along) if taper is not None]
     if empty.any():

@@ -42,7 +42,7 @@ REFUSED = {
         "--coherence-width -1": "--coherence-width '-1' must be",
         "-o missing/a.exr": "cannot write 'missing/a.exr'",
         "--material Unobtainium": "Unobtainium",
-        "--fill hope": "--fill: expected",
+        "--fill hope": "--fill 'hope' must be one of",
         "--method flss --relative --int-ior glass": "takes a number",
     },
     "brdf-map": {

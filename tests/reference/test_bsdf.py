@@ -203,6 +203,13 @@ def test_arguments_broadcast():
     assert reference.brdf(SMALL, polar(0), polar(3), [400.0, 500.0]).shape == (2,)
 
 
+def test_an_open_patch_sends_nothing_beyond_its_pixels_frequencies():
+    field = HeightField(np.random.default_rng(0).normal(0, 0.02, (8, 8)), 0.2, cut_out=True)
+    wi, wo = [-0.390, -0.855, 0.342], [-0.120, -0.982, 0.146]
+    values = reference.brdf(field, wi, wo, [385.0, 550.0])
+    assert values[0] == 0.0 < values[1]
+
+
 def test_a_window_may_be_wider_than_any_table_s():
     widths = (500.0, 5000.0)
     narrow, wide = (
@@ -228,6 +235,8 @@ def test_a_window_may_be_wider_than_any_table_s():
         ({"wavelength": 0.0}, "wavelength must be positive, in nm"),
         ({"wavelength": np.nan}, "wavelength must be positive, in nm"),
         ({"wi": [0.0, 1.0]}, r"wi has shape \(2,\)"),
+        ({"wo": [0.0, 0.6, 0.6]}, "wo must be unit vectors, one has the length 0.8485"),
+        ({"wi": [0.0, np.nan, 1.0]}, "wi must be unit vectors"),
         ({"wi": np.zeros((2, 3)), "wo": np.zeros((3, 3))}, "do not broadcast to one length"),
     ],
 )

@@ -107,7 +107,8 @@ def python_page() -> str:
         "Made by `python -m docs.make.figures.interfaces -o docs`.",
         pages.table(("name", "what it is", "names in it"), rows),
         "Lengths are in µm, wavelengths in nm, angles in degrees; directions are unit vectors that "
-        "point away from the surface. Every bad input is an `md.DiffractionError` of one line; "
+        "point away from the surface. Every bad input is an `md.DiffractionError` of one line, "
+        "which `mi.load_dict` and `mi.load_file` turn into a `RuntimeError` that ends in it; "
         "doubts are an `md.DiffractionWarning`.",
     ]) + "\n"  # fmt: skip
 

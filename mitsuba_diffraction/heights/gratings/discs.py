@@ -37,7 +37,7 @@ _GROWTH = 1.455785
 
 
 @dataclass(frozen=True)
-class Format:
+class DiscFormat:
     """Sizes of a disc's pits and their tolerances; lengths in µm."""
 
     name: str
@@ -51,10 +51,10 @@ class Format:
 
 # Walls rise at 50° to 60° over the depth. Pits of a DVD are placed within 7 nm across the track, a
 # figure of AFM quality control; 10 nm is assumed for a CD.
-CD = Format(
+CD = DiscFormat(
     name="cd", bit=0.27766, width=0.5, slope=0.1, jitter=0.015, wander=0.01, roughness=0.002
 )
-DVD = Format(
+DVD = DiscFormat(
     name="dvd", bit=0.13333, width=0.32, slope=0.07, jitter=0.008, wander=0.007, roughness=0.0015
 )
 
@@ -110,7 +110,7 @@ def dvd(
 
 
 def _disc(
-    disc: Format,
+    disc: DiscFormat,
     extent: Lengths,
     pixels: Counts,
     seed: int,
@@ -143,7 +143,7 @@ def _disc(
 
 
 def _track(
-    rng: Rng, disc: Format, length: float, x: Real, irregularity: float
+    rng: Rng, disc: DiscFormat, length: float, x: Real, irregularity: float
 ) -> tuple[Real, Real, Real]:
     """Draw the pits of one track of `length` µm, which is closed.
 
