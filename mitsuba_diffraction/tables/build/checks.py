@@ -32,9 +32,16 @@ def check_patches(patches: Sequence[HeightField], settings: TableSettings) -> No
     """Refuse patches that tile the plane if their powers cannot be averaged."""
     if not patches:
         raise build_error("there is no height field; give at least one")
+    taylor = settings.basis == "taylor"
+    for patch in patches:
+        if taylor and patch.cut_out and not settings.coherent:
+            raise build_error(
+                f"'{patch.name}' is a part of a larger surface: the powers of its windows are "
+                "averaged, which basis='taylor' cannot; use basis='svd', coherence='patch', or "
+                "heights that repeat"
+            )
     if len(patches) == 1 or settings.taper_width is not None:
         return
-    taylor = settings.basis == "taylor"
     if settings.coherent or taylor:
         setting = "basis='taylor'" if taylor else f"coherence='{settings.coherence}'"
         raise build_error(

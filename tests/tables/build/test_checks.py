@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -97,6 +99,7 @@ def test_too_few_taps_are_refused_with_the_error_they_leave():
         ({"heights": []}, "there is no height field; give at least one"),
         ({"heights": [PATCH, PATCH], "coherence": "patch"}, "which coherence='patch' cannot"),
         ({"heights": [PATCH, PATCH], "basis": "taylor"}, "which basis='taylor' cannot"),
+        ({"heights": replace(PATCH, cut_out=True), "basis": "taylor"}, "coherence='patch', or"),
         ({"heights": [PATCH, DEEP]}, "crop them to one size"),
         ({"coherence_width": 0.05}, "look-up would read"),
     ],

@@ -148,6 +148,17 @@ def test_few_orders_of_wide_lobes_appear_over_the_width_of_a_lobe():
     np.testing.assert_allclose(found, exact, atol=0.05)
 
 
+def test_lobes_of_a_window_wider_than_its_patch_show():
+    """Orders 1.8/σ apart: sums of their lobes ripple by a tenth, and albedos were 0.21 off."""
+    steps = 0.18 * (np.arange(31) % 8 < 4) + np.zeros((45, 1))
+    patch = md.HeightField(steps, (0.0854, 0.168), periodic=True)
+    light = {"wavelength_range": (650.0, 660.0)}
+    table = md.DiffractionTable.build(patch, coherence_width=3.1, **light)
+    exact, found = integrals_and_sums(table, [30.0, 50.0], [37.0, 90.0, 200.0, 301.0], 656.0)
+    # samples of the density, a quarter of a lobe's deviation apart
+    np.testing.assert_allclose(found, exact, rtol=0.01)
+
+
 @pytest.mark.parametrize("surface", ["grating", "rough"])
 def test_a_dielectric_gains_nothing_and_nothing_is_taken(tables, surface):
     glass = SurfaceEnergy(tables[surface], reflector("small_slope", 1.5))
