@@ -37,7 +37,7 @@ DONE = [
     ["evaluate", *_TABLE, "--coherence-width", "12", "--periodic", "exact", *_METAL, "--step", "40",
      "--angle-step", "0.5", "--positions", "0", "-o", "out/bands.png"],
     ["sweep", "coherence-width", *_HEIGHTS[:3], "--values", "4", "--resolution", "8", "--step",
-     "100", "--no-compiled", "-o", "out/sweep.png"],
+     "100", "-o", "out/sweep.png"],
     ["survey", *_TABLE, "--resolution", "8", "-o", "out/survey"],
     ["scatter", *_HEIGHTS, "-o", "out/scatter.csv"],
     ["solve", "sinusoidal", "--period", "0.6", "--depth", "0.03", "--material", "none", "--theta",

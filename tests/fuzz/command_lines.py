@@ -35,7 +35,7 @@ _SCENE = """<scene version="3.0.0"><default name="resx" value="6"/>
 # what would take long otherwise; an option that comes again counts
 _SMALL = {
     "brdf-map": ["--resolution", "8", "--samples", "1"],
-    "sweep": ["--resolution", "8", "--no-compiled"],
+    "sweep": ["--resolution", "8"],
     "evaluate": ["--positions", "0"],
     "render": ["-m", "scalar_rgb", "-s", "1"],
     "compare": ["-m", "scalar_rgb"],
@@ -69,7 +69,8 @@ def command_line(rng: np.random.Generator) -> list[str]:
             count = action.nargs if isinstance(action.nargs, int) else 1
             for _ in range(count if rng.random() < 0.97 else count - 1):
                 words.append(_value(rng, action, files))
-    return words + (_SMALL.get(name, []) if rng.random() < 0.98 else [])
+    small = _SMALL.get(name, []) + (["--no-compiled"] if words[:2] == ["sweep", "method"] else [])
+    return words + (small if rng.random() < 0.98 else [])
 
 
 def _value(rng: np.random.Generator, action: argparse.Action, files: list[str]) -> str:

@@ -37,7 +37,7 @@ SMALL = {
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--positions", "2", "--coherence-width=10"],
     "solve": ["--period", "0.25", "--resolution", "64", "--tolerance", "0.2", *_NARROW],
-    "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
+    "sweep": ["--coherence-width", "10", "--resolution", "12"],
     "export-bsdf": ["--theta", "0,40", "--phi", "0,180", "--resolution", "8"],
     "export-viewer": ["--method", "exact"],
     "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
@@ -174,6 +174,10 @@ def small_tree(folder: Path) -> Path:
     drawn(32, 1).save(folder / "logo.png")
     write_board(folder / "bottle.obj")
     (folder / "r2.csv").write_text("0,0\n2.5316,5.0633\n", "utf-8")
+    rough = (
+        'generator = "rough"\n[arguments]\nextent = 8.0\npixels = 40\nrms = 0.003\nslope = 1.0\n'
+    )
+    (folder / "polished.toml").write_text(rough, "utf-8")
     (folder / "mirror.toml").write_text('layers = [["SiO2", 0.1], ["1.95", 0.07]]', "utf-8")
     # efficiencies as the page's programs write them
     with contextlib.chdir(folder):

@@ -30,7 +30,8 @@ def test_a_map_is_the_reference_integrated_over_pixels_and_wavelengths():
     for shift_x, shift_y, offset in hemisphere.sub_samples(samples):
         x, y = (x0 + shift_x * 2 / n).ravel(), (y0 + shift_y * 2 / n).ravel()
         z2 = 1 - x**2 - y**2
-        wo = np.stack([x, y, np.sqrt(np.maximum(z2, 0))], axis=1)  # 0 when below: the BRDF is 0
+        wo = np.stack([x, y, np.sqrt(np.maximum(z2, 0))], axis=1)
+        wo /= np.linalg.norm(wo, axis=1, keepdims=True)  # beyond the horizon on it: the BRDF is 0
         lam = bands.wavelengths(offset)
         for wavelength, weight in zip(lam, response(lam) * bands.width, strict=True):
             f = md.reference.brdf(field, light.direction, wo, wavelength, coherence_width=width)
