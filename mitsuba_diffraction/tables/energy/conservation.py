@@ -174,7 +174,7 @@ class SurfaceEnergy:
         most_fringes = min(fringes, settings.fringes)
         if not self._both_sides:
             albedo, largest = self._albedo(wavelength_range, beneath, most_fringes)
-        if largest <= settings.threshold:
+        if largest <= max(settings.threshold, 1.0 - self.orders.others):
             return Conservation(albedo)
         count = settings.side_wavelengths if self._both_sides else settings.wavelengths
         nodes = spread(wavelength_range, count, max(most_fringes, min(count, 4)))
@@ -269,7 +269,9 @@ class SurfaceEnergy:
         """Find s at the grid's directions."""
         settings = self._settings
         albedo = light.sent(self._ones)
-        aim = self._ones if self._both_sides else np.minimum(albedo, np.float32(settings.target))
+        # order 0 is as smooth as the reflectance: between directions it needs no margin
+        target = np.float32(max(settings.target, 1.0 - self.orders.others))
+        aim = self._ones if self._both_sides else np.minimum(albedo, target)
         if np.abs(albedo - aim).max() < settings.close:
             return self._ones
         # Beyond 80° part of a lobe is below the horizon. A reflector keeps that deficit: light that

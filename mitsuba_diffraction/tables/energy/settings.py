@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 58
+VERSION = 60
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class EnergySettings:
     sweeps : of Sinkhorn and Knopp's iteration.
     threshold : a reflector's albedo that is nowhere above needs no scale.
     target : albedos above are scaled to this; the margin to 1 is for directions between nodes.
+        Both margins are at most the light that other orders than 0 have.
     calm : light between wavelengths of which the middles of 600 cells send on no more is looked at
         no further, first of surfaces with more than `few_orders` strong orders, then of those with
         fewer, whose kinks such a look misses: a CD of aluminium had 1.012.

@@ -101,6 +101,11 @@ class ScatteredOrders:
         #: Least w of light let through
         self.least_width = densest * self.mixture.kappa_step / shortest
 
+    @property
+    def others(self) -> float:
+        """Most light that all orders but 0 have, or 1 where some are strong."""
+        return 1.0 if self.strong else self.mixture.weak
+
     def has_weak(self, model: str) -> bool:
         """Whether the weak orders of a model matter."""
         least = LEAST_GRAZING if model == "kirchhoff" else LEAST_WEAK
