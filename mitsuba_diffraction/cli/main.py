@@ -140,8 +140,13 @@ def build_parser() -> argparse.ArgumentParser:
     )
     for command in COMMANDS:
         command.add_to(subparsers)
-    makers = (subparsers.choices[name] for name in ("precompute", "solve"))
-    parser.set_defaults(flags=flags_of(*makers))  # of tables, which messages may want made again
+    # of tables, which messages may want made again
+    flags = {
+        name: f"{maker} {flag}"
+        for maker in ("precompute", "solve")
+        for name, flag in flags_of(subparsers.choices[maker]).items()
+    }
+    parser.set_defaults(flags=flags)
     for subparser in subparsers.choices.values():
         _add_common(subparser.add_argument_group("general"))
     return parser

@@ -252,10 +252,9 @@ def option_of(args: argparse.Namespace, name: str) -> str:
     return str(action.option_strings[-1] if action.option_strings else action.metavar)
 
 
-def flags_of(*parsers: argparse.ArgumentParser) -> dict[str, str]:
-    """Return the options of parsers by the names of their values; later parsers precede."""
-    actions = (action for parser in parsers for action in parser._actions)
-    return {each.dest: each.option_strings[-1] for each in actions if each.option_strings}
+def flags_of(parser: argparse.ArgumentParser) -> dict[str, str]:
+    """Return the options of a parser by the names of their values."""
+    return {each.dest: each.option_strings[-1] for each in parser._actions if each.option_strings}
 
 
 def refuse(args: argparse.Namespace, names: Iterable[str], why: str) -> None:
