@@ -320,7 +320,10 @@ def _named(
     for line in reversed(header.values()):
         if line.startswith(_END):
             continue
-        cells = [cell.strip().strip('"').strip() for cell in split(line.lstrip("#% "))]
+        text = line.lstrip("#% ")
+        if split is str.split:  # a unit belongs to the name before it: "x [nm] y [nm]"
+            text = re.sub(r"(?<=[^\s\])])\s+(?=[\[(])", "", text)
+        cells = [cell.strip().strip('"').strip() for cell in split(text)]
         if len(cells) == count - 1 and split is str.split and line.lstrip()[0] not in "#%":
             cells = ["", *cells]  # R's write.table does not name the names of rows
         if len(cells) != count or not any(cells) or any(map(_is_number, cells)):

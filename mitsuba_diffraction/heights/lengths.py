@@ -24,6 +24,12 @@ UNITS = {
     "\u00c5": 1e-4,
 }  # fmt: skip
 
+_WORDS = {
+    f"{prefix}met{end}": UNITS[unit]
+    for prefix, unit in (("nano", "nm"), ("micro", "um"), ("milli", "mm"))
+    for end in ("er", "re")
+} | {"micron": 1.0, "angstrom": 1e-4}
+
 PixelSize = float | str | Iterable[float]
 Crop = PixelSize
 Height = float | str
@@ -64,7 +70,8 @@ def height_of(value: Height | None) -> float | None:
 
 def micrometres_of(unit: str) -> float | None:
     """Return how many µm one `unit` of length is, or `None` if the unit is unknown."""
-    return UNITS.get(unicodedata.normalize("NFKC", unit.strip()))
+    name = unicodedata.normalize("NFKC", unit.strip())
+    return UNITS.get(name, _WORDS.get(name.lower().removesuffix("s")))
 
 
 def height_unit_of(value: str | None) -> str | None:

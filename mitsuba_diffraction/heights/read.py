@@ -310,6 +310,10 @@ def _height_scale(
             f"{shown} {unit_stated} for its heights; give height_unit, and pixel_size in µm if "
             "that is missing, too, for instance height_unit=nm pixel_size=0.05"
         )
+    if raw.unclear:
+        return raw.unit, [
+            f"heights are read as µm; is their unit in {raw.unclear}? Give height_unit"
+        ]
     return raw.unit, []
 
 

@@ -34,6 +34,7 @@ class RawHeights:
     notes: tuple[str, ...] = ()  # one line per choice that the reader made
     unit: float | None = 1.0  # µm in one unit of the values; None if the file says no length
     stated: str = ""  # name of that unit in the file; "" if the format implies µm
+    unclear: str = ""  # place in the file that names another unit than µm, though not the heights'
 
 
 def first_line(error: BaseException) -> str:

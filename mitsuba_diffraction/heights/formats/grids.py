@@ -29,6 +29,7 @@ _SIZE = re.compile(
     rf"[#;%\s]*+(?:({_WIDTH})|{_HEIGHT})\s*+[:=]\s*+([-+.,\deE]++)\s*+(\S++)\s*+$",
     re.IGNORECASE,
 )
+_OTHERS = (1e-4, 1e-3, 1e3, 1e4)  # µm in Å, nm, mm and cm
 # "# Value units: nm", "# height in nm"
 _STATED = re.compile(
     r"[#;%\s\"]*+(?:(?:(?:Value|Height|Z) )?units?\s*+[:=]\s*+|(?:all |the )?+(?:heights?|z)"
@@ -126,8 +127,11 @@ def read_text(path: Path) -> RawHeights:
         named = size is not None
     ny, nx = values.shape
     pixel_size = (size[0] / nx, size[1] / ny) if size else None
-    unit = micrometres_of(stated) if stated else 1.0
-    return RawHeights(values[::-1], pixel_size, notes=notes, unit=unit, stated=stated, sized=named)
+    unit, unclear = (micrometres_of(stated), "") if stated else (1.0, _other_unit(table.header))
+    return RawHeights(
+        values[::-1], pixel_size, notes=notes, unit=unit, stated=stated, sized=named,
+        unclear=unclear,
+    )  # fmt: skip
 
 
 def _without_labels(
@@ -172,6 +176,15 @@ def _stated_unit(line: str) -> str:
     match = _NAMED.match(line)
     unit = (match[1] or match[2]) if match else ""
     return unit if micrometres_of(unit) else ""
+
+
+def _other_unit(header: dict[int, str]) -> str:
+    """Return the first line that names nm, Å, mm or cm, for messages, but for sizes; or ""."""
+    for place, line in header.items():
+        words = re.findall(r"[^\W\d_]+", line)
+        if not _SIZE.match(line) and any(micrometres_of(word) in _OTHERS for word in words):
+            return f"line {place}, {quoted(line.strip())}"
+    return ""
 
 
 def _read_header(header: Iterable[str], shown: str) -> tuple[str, tuple[float, float] | None]:

@@ -173,7 +173,27 @@ def test_a_unit_that_a_line_above_the_grid_states_is_that_of_the_heights(tmp_pat
     assert HeightField.load(file, pixel_size=0.5, level="none").heights.max() == pytest.approx(1e-3)
 
 
-@pytest.mark.parametrize("line", ["# Height (retrace)", "# heights of nm size", "# 9 rows in all"])
+@pytest.mark.parametrize(
+    "line", ["# heights of nm size", "# Height: nm", "# z-unit = nm", "# Data in nanometers"]
+)
+def test_a_unit_that_is_perhaps_not_the_heights_is_asked_about(tmp_path, line):
+    (tmp_path / "a.txt").write_text(f"{line}\n0.5 0.25\n0.75 1\n", encoding="utf-8")
+    with pytest.warns(DiffractionWarning, match="Give height_unit"):
+        HeightField.load(tmp_path / "a.txt", pixel_size=0.5)
+    field = HeightField.load(tmp_path / "a.txt", pixel_size=0.5, height_unit="nm", level="none")
+    assert field.heights.max() == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("head", ["# x [nm] y [nm] z [nm]", "X (nm) Y (nm) Z (nanometers)"])
+def test_points_separated_by_blanks_have_the_units_of_their_names(tmp_path, head):
+    file = tmp_path / "a.xyz"
+    np.savetxt(file, np.array(POINTS) * 1e3, header=head, comments="")
+    field = HeightField.load(file, level="none")
+    assert field.pixel_size == pytest.approx((0.5, 0.25))
+    assert field.range == pytest.approx(23.0)
+
+
+@pytest.mark.parametrize("line", ["# Height (retrace)", "# 9 rows in all", "# Value units: um"])
 def test_other_comments_state_no_unit(tmp_path, line):
     (tmp_path / "a.txt").write_text(f"{line}\n0.5 0.25\n0.75 1\n", encoding="utf-8")
     assert HeightField.load(tmp_path / "a.txt", pixel_size=0.5, level="none").heights.max() == 1.0
