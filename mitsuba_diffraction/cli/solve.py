@@ -42,9 +42,9 @@ def _layer(text: str) -> Layers:
             return read_layers(text)
         except DiffractionError as error:
             raise argparse.ArgumentTypeError(str(error)) from error
-    material, _, thickness = text.rpartition(":")
+    material, colon, thickness = text.rpartition(":")
     try:
-        return ((material, float(thickness)),)
+        return ((material, float(thickness if colon else "")),)
     except ValueError as error:
         raise argparse.ArgumentTypeError(
             "expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, or a file (.toml), got "
@@ -206,8 +206,10 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
     light: dict[str, Any] = {}
     if args.theta is not None:
         light = {"theta": args.theta, "phi": args.phi or 0.0}
-    elif args.phi is not None or (args.step is not None and not args.crossed):
-        args.parser.error("arguments --phi, --step: only with --theta")
+    else:
+        options.refuse(args, ["phi"], ": only with --theta")
+        if not args.crossed:
+            options.refuse(args, ["step"], ": only with --theta or --crossed")
     tolerance = recipe.settings.tolerance
     limits = (
         f"; tolerance: {tolerance:.2%} of the light in orders on average, {WORST * tolerance:.2%} "

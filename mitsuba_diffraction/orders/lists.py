@@ -316,7 +316,7 @@ def check_light(wavelengths: Real, theta: Real, phi: Real, shown: str) -> None:
     for name, numbers, allowed, hint in (
         ("wavelength", wavelengths, (wavelengths >= low) & (wavelengths <= high),
          f"{low:g} to {high:g} nm; is the unit right?"),
-        ("theta", theta, np.abs(theta) < 90, "between -90° and 90°"),
+        ("theta", theta, np.abs(theta) < 90, "above -90° and below 90°"),
         ("phi", phi, np.abs(phi) <= 360, "-360° to 360°"),
     ):  # fmt: skip
         _check_all(name, numbers, allowed, hint, shown)

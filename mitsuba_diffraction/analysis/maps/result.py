@@ -78,7 +78,7 @@ class Bands:
         if not (0.0 < self.low <= self.high and math.isfinite(self.high)):
             raise DiffractionError(
                 f"wavelength range {self.low:g} to {self.high:g} nm is empty; give the shortest "
-                "first, both above 0, e.g. 380 780"
+                "first, both above 0, e.g. 380 to 780"
             )
         if self.is_single:
             return

@@ -271,7 +271,7 @@ def trapezoid_rule(
     if not (0.0 < low < high < np.inf):
         raise DiffractionError(
             f"wavelength_range={low:g}, {high:g} nm is empty; give the shortest first, both above "
-            "0, e.g. 380 780"
+            "0, e.g. 380 to 780"
         )
     if not _FINEST_STEP <= step <= (high - low) * (1.0 + 1e-12):
         raise DiffractionError(
