@@ -22,7 +22,8 @@ from . import RawHeights, first_line
 # bytes of a text of so many points, x, y and height
 _LARGEST = 24 * 3 * MOST_PIXELS
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
-# Repetitions are possessive: a line of n characters takes n steps, and not n².
+# Repetitions are possessive: a line of n characters takes n steps, and not n². Groups are not:
+# Python 3.11.2 would match them wrongly.
 _WIDTH = "Width|Breite|Largeur|Ancho|Larghezza|Largura|Šířka|Ширина"
 _HEIGHT = "Height|Höhe|Hauteur|Alto|Altura|Altezza|Výška|Высота"
 _SIZE = re.compile(
@@ -32,8 +33,8 @@ _SIZE = re.compile(
 _OTHERS = (1e-4, 1e-3, 1e3, 1e4)  # µm in Å, nm, mm and cm
 # "# Value units: nm", "# height in nm"
 _STATED = re.compile(
-    r"[#;%\s\"]*+(?:(?:(?:Value|Height|Z) )?units?\s*+[:=]\s*+|(?:all |the )?+(?:heights?|z)"
-    r"(?: values?)?+(?: are| is)?+ in )([^\s,;\".]++)[\s,;\".]*+$",
+    r"[#;%\s\"]*+(?:(?:(?:Value|Height|Z) )?units?\s*+[:=]\s*+|(?:all |the )?(?:heights?|z)"
+    r"(?: values?)?(?: are| is)? in )([^\s,;\".]++)[\s,;\".]*+$",
     re.IGNORECASE,
 )
 # "Height [nm]", "# values in nm"; other words may be there: "# Height (retrace)"
