@@ -70,8 +70,8 @@ USAGE = 2
 class Parser(argparse.ArgumentParser):
     """Argument parser whose errors are one line, with the values that they quote shortened.
 
-    Ranges may begin with a minus: -60:60:5 is no option. `given` of the result has the names of
-    the values that the command line names, which `options.given` asks for.
+    Ranges may begin with a minus: -60:60:5 is a range. The result's `given` has the names of all
+    options and arguments on the command line, for `options.given`.
     """
 
     def __init__(self, **how: Any) -> None:

@@ -148,7 +148,7 @@ def load_by_plan(
 
 
 def check_plan_options(args: argparse.Namespace) -> None:
-    """Refuse options of a plan that is not made; a usage error."""
+    """Refuse options of a plan where no plan is made, with a usage error."""
     made = ("paths", "plan_tolerance")
     if args.plan is None:
         options.refuse(args, made, ": is for --plan, which is missing")

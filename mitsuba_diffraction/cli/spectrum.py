@@ -191,7 +191,7 @@ def _measured_curve(
 ) -> tuple[Any, Any] | None:
     """Return wavelengths (n,) in nm and values (n,) of --measured, or None.
 
-    Raises a DiffractionError if the file is no reflectance, or has other wavelengths.
+    Raises a DiffractionError if the file has no reflectances, or none at these wavelengths.
     """
     if args.measured is None:
         return None

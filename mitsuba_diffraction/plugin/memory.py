@@ -26,7 +26,7 @@ Shared = TypeVar("Shared")
 
 
 def once_a_table(make: Callable[[Table], Shared]) -> Callable[[Table], Shared]:
-    """Let all BSDFs of a table share what is made of it, in each variant's memory."""
+    """Let all BSDFs of a table share one object that is made of the table, in each variant."""
     made: weakref.WeakKeyDictionary[Any, dict[str, Shared]] = weakref.WeakKeyDictionary()
 
     def shared(table: Table) -> Shared:

@@ -80,7 +80,7 @@ class SpectralPower:
     def _power(
         self, pair: Pair | TablePoint, height_scale: Float, si: Interaction
     ) -> tuple[PerWavenumber, int]:
-        """Return a function whose values are those of `Powers`, and their number."""
+        """Return a function that computes the values of `Powers`, and the number of values."""
         scaled_w = pair.w * height_scale
         if self._places is None or not isinstance(pair, Pair):
             windows: Sequence[PlacedWindow] = ()

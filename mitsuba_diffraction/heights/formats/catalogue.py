@@ -17,9 +17,9 @@ class Format(NamedTuple):
     ----------
     name, suffixes : the format, and usual suffixes; the content of a file decides.
     makers : instruments and programs that write it.
-    last : lengths to give as options, which a file does not say, "" if it says all; or what to do
-        instead, of formats that are not read.
-    begins : first bytes of a file that is not read; () if they do not tell it.
+    last : options for lengths that a file does not state, "" if it states all lengths; of a format
+        that no reader reads, the remedy.
+    begins : first bytes that identify a format that no reader reads; () if none do.
     """
 
     name: str

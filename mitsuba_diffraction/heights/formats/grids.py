@@ -22,8 +22,8 @@ from . import RawHeights, first_line
 # bytes of a text of so many points, x, y and height
 _LARGEST = 24 * 3 * MOST_PIXELS
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
-# Repetitions are possessive: a line of n characters takes n steps, and not n². Groups are not:
-# Python 3.11.2 would match them wrongly.
+# Repetitions are possessive: a line of n characters takes n steps, and not n². Groups repeat
+# without possession, because Python 3.11.2 matches possessive groups wrongly.
 _WIDTH = "Width|Breite|Largeur|Ancho|Larghezza|Largura|Šířka|Ширина"
 _HEIGHT = "Height|Höhe|Hauteur|Alto|Altura|Altezza|Výška|Высота"
 _SIZE = re.compile(
@@ -224,7 +224,7 @@ def _from_points(
 ) -> tuple[npt.NDArray[np.float64], tuple[float, float]]:
     """Arrange points (n, 3) of x, y, height into a grid, first row the largest y.
 
-    Points that are not listed are NaN, as points without a height.
+    Grid points that the file lacks are NaN, as grid points without a height are.
 
     Returns
     -------

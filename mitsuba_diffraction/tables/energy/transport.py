@@ -98,19 +98,20 @@ class ScatteredOrders:
         left = self.mixture.central / np.maximum(order_0_power(table, nodes * scale), 1e-12)
         powers = order_0_power(table, self._kappas * scale)
         self._powers = powers * np.interp(self._kappas, nodes, left)
+        # light that interferes with order 0 goes with the root of its power
+        weak = self.mixture.weak
+        self._weak = weak if self.mixture.beats is None else math.sqrt(weak)
         #: Least w of light let through
         self.least_width = densest * self.mixture.kappa_step / shortest
 
     @property
     def others(self) -> float:
         """Most light that all orders but 0 have, or 1 where some are strong."""
-        return 1.0 if self.strong else self.mixture.weak
+        return 1.0 if self.strong else self._weak
 
     def has_weak(self, model: str) -> bool:
         """Whether the weak orders of a model matter."""
-        least = LEAST_GRAZING if model == "kirchhoff" else LEAST_WEAK
-        # light that interferes goes with its root
-        return self.mixture.weak > (least if self.mixture.beats is None else least**2)
+        return self._weak > (LEAST_GRAZING if model == "kirchhoff" else LEAST_WEAK)
 
     def quadrature(self, above: float, critical_sine: float | None = None) -> Quadrature:
         """Return directions for light of a wavenumber above the surface: closer for short waves.
