@@ -286,7 +286,7 @@ def run_survey(
     todo = list(jobs)
     files_of_jobs = [Path(named[n]["file"]).name for n in todo]
     progress(0, len(todo), _next(files_of_jobs, 0, client))
-    results = WorkerCalls(client).finished(measure, [jobs[n] for n in todo])
+    results = WorkerCalls(client).answers(measure, [jobs[n] for n in todo])
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):

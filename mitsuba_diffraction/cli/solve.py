@@ -16,7 +16,7 @@ from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, output_of
-from .workers import WORKERS, executor_for
+from .workers import WORKERS, calls_for
 
 if TYPE_CHECKING:
     from ..orders import OrderTable
@@ -216,7 +216,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
         "in 95 % of directions"
     )
     folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
-    with executor_for(args) as (executor, processes), Bar(args, " stations") as bar:
+    with calls_for(args) as (calls, processes), Bar(args, " stations") as bar:
 
         def announce(estimate: Estimate) -> None:
             size = f" for a table of {estimate.size / 1e6:.2g} MB" if estimate.size else ""
@@ -239,7 +239,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             **light,
             step=args.step,
             settings=recipe.settings,
-            jobs=Jobs(folder, executor, bar),
+            jobs=Jobs(folder, calls, bar),
             announce=announce,
         )
     remove_results(folder)

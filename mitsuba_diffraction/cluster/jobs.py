@@ -97,14 +97,21 @@ class WorkerCalls:
         """
         wanted, early = 0, dict[int, Any]()
         for n, result in self.finished(work, arguments, early):
-            if isinstance(result, Failed):
-                raise DiffractionError(str(result))
             early[n] = result
             while wanted in early:
                 yield early.pop(wanted)
                 wanted += 1
 
     def finished(
+        self, work: Callable[[Any], Any], arguments: Iterable[Any], early: Sized | None = None
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield results as `answers` does, and raise a DiffractionError if a call fails, too."""
+        for n, result in self.answers(work, arguments, early):
+            if isinstance(result, Failed):
+                raise DiffractionError(str(result))
+            yield n, result
+
+    def answers(
         self, work: Callable[..., Any], arguments: Iterable[Any], early: Sized | None = None
     ) -> Iterator[tuple[int, Any]]:
         """Yield the number and the result of each call as it finishes.

@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterable, Iterator
-from concurrent.futures import CancelledError, Executor
+from concurrent.futures import CancelledError
 from typing import Any
 
 from ..errors import DiffractionError, one_line
@@ -24,10 +24,6 @@ VARIABLE = "DASK_SCHEDULER_ADDRESS"
 PATIENCE = 60.0
 #: Seconds between counts of the workers.
 COUNT_EVERY = 2.0
-_DIED = (
-    "died, as did those before that had the same task; a worker may lack memory, see "
-    "docs/cluster.md"
-)
 GONE = (
     "the scheduler is gone; start it and its workers, and run the same command again, which goes "
     "on from the stored results"
@@ -137,21 +133,6 @@ def workers_of(client: Any) -> dict[str, Any]:
         return {}
 
 
-@contextlib.contextmanager
-def executor_of(client: Any) -> Iterator[Executor]:
-    """Yield the client's workers as an executor, whose tasks another worker repeats if one dies.
-
-    Raises a DiffractionError if several workers die of the same task, or the scheduler is gone.
-    """
-    distributed = optional("distributed")
-    try:
-        yield client.get_executor()
-    except distributed.scheduler.KilledWorker as error:
-        raise DiffractionError(f"worker {error.last_worker.address} {_DIED}") from error
-    except (CancelledError, distributed.client.FutureCancelledError, OSError) as error:
-        raise DiffractionError(GONE) from error
-
-
 class Headcount:
     """Number of workers, counted every `COUNT_EVERY` seconds.
 
@@ -187,7 +168,8 @@ def outcome(future: Any) -> Any:
     except (Failed, MissingFiles) as error:
         return error
     except distributed.scheduler.KilledWorker as error:
-        return Failed(f"it {_DIED}", error.last_worker.address)
+        reason = "it died, as did those before that had the same task; a worker may lack memory"
+        return Failed(f"{reason}, see docs/cluster.md", error.last_worker.address)
     except (CancelledError, distributed.client.FutureCancelledError, OSError):
         return None
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -32,6 +32,9 @@ from .sheet import sheet_efficiencies
 from .stations import LEAST_COSINE, Grating, Solver, on_both_sides
 
 Spot = TypeVar("Spot", bound=AnyPlace)
+#: Calls a function with each argument, and yields the number and the result of a call as it
+#: finishes.
+Calls = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[tuple[int, Any]]]
 
 #: Solvers by name: from a profile, a resolution (points on the boundary; harmonics) and, where they
 #: solve layers, a structure.
@@ -201,6 +204,24 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     return Solved(values.astype(np.complex64), time.thread_time() - start)
 
 
+def calls_here(work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[tuple[int, Any]]:
+    """Call a function in this process, in the order of the arguments; see `Calls`."""
+    return enumerate(map(work, arguments))
+
+
+def calls_in(
+    pool: Executor, work: Callable[[Any], Any], arguments: Iterable[Any]
+) -> Iterator[tuple[int, Any]]:
+    """Call a function in the processes of a pool; see `Calls`."""
+    futures = {pool.submit(work, argument): n for n, argument in enumerate(arguments)}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
 @dataclass
 class Jobs:
     """Where stations are solved, and kept: none is solved twice.
@@ -209,13 +230,13 @@ class Jobs:
     ----------
     folder : of results, which another run finds again, made when needed; None keeps them in memory
         alone.
-    executor : processes or a cluster; None solves here.
+    calls : solves, in other processes or on a cluster; by default here, a place after the other.
     progress : called as progress(done, total, text).
     announce : called with the `settings.Estimate` of each stage before it starts; None for none.
     """
 
     folder: Path | None = None
-    executor: Executor | None = None
+    calls: Calls = calls_here
     progress: Progress = silent
     announce: Callable[[Any], None] | None = None
     _known: dict[str, Solved] = field(default_factory=dict, init=False)
@@ -239,8 +260,8 @@ class Jobs:
             make_folder(self.folder)
         done = len(names) - len(missing)
         self.progress(done, len(names), text)
-        for place, solved in self._solved(problem, missing):
-            name = names[place]
+        for n, solved in self.calls(partial(solve_place, problem), missing):
+            name = names[missing[n]]
             self._known[name] = solved
             if self.folder is not None:
                 record = Record({"seconds": solved.seconds}, [solved.values])
@@ -269,21 +290,8 @@ class Jobs:
 
     def seconds(self, problem: Problem, place: AnyPlace) -> float:
         """Return the processor seconds that a place takes."""
-        if self.executor is None:
-            return timed(problem, place)
-        return float(self.executor.submit(timed, problem, place).result())
-
-    def _solved(self, problem: Problem, places: Iterable[Spot]) -> Iterator[tuple[Spot, Solved]]:
-        if self.executor is None:
-            yield from ((place, solve_place(problem, place)) for place in places)
-            return
-        futures = {self.executor.submit(solve_place, problem, place): place for place in places}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+        ((_, seconds),) = self.calls(partial(timed, problem), [place])
+        return float(seconds)
 
 
 def _names(problem: Problem, places: Iterable[Spot]) -> dict[Spot, str]:
