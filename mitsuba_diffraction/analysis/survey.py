@@ -258,6 +258,7 @@ def run_survey(
     files = scan_files(files)
     if not files:
         raise DiffractionError("there is no scan to survey; name files")
+    calls = None if client is None else WorkerCalls(client, variant)
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
     shown = tuple((surface or {}).items())
@@ -286,7 +287,8 @@ def run_survey(
     todo = list(jobs)
     files_of_jobs = [Path(named[n]["file"]).name for n in todo]
     progress(0, len(todo), _next(files_of_jobs, 0, client))
-    results = WorkerCalls(client).answers(measure, [jobs[n] for n in todo])
+    given = [jobs[n] for n in todo]
+    results = enumerate(map(measure, given)) if calls is None else calls.answers(measure, given)
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):

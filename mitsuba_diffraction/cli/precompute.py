@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..cluster.jobs import build_on_workers
+from ..cluster.jobs import WorkerCalls
 from ..errors import counted, warn
 from ..files import FileKind, kind_of
 from ..heights import HeightField
@@ -94,8 +94,8 @@ def _built(
     if not on_workers(args):
         return build_with(fields, settings, bar), {}
     with client_of(args) as client:
-        table, work = build_on_workers(fields, settings, client, bar)
-        return table, work.summary()
+        calls = WorkerCalls(client)
+        return build_with(fields, settings, bar, calls), calls.summary()
 
 
 def _report(

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..cluster import FrameRequest, FrameSequence, connect
 from ..cluster.jobs import WorkerCalls
-from ..cluster.workers import VARIABLE, check_workers
+from ..cluster.workers import VARIABLE
 from ..errors import counted
 from ..system import cores
-from .console import Bar, say, say_warning
+from .console import Bar, say
 from .options import Group, refuse, whole_number
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def film_of(
     with Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         film = FrameSequence(
-            client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
+            client, args.scene, frames, variant, keep=keep, sensor=args.sensor,
             preview=args.preview, threads=worker_threads(args),
         )  # fmt: skip
     say_files(path for task in film.frames for path, _ in task.files.files)
@@ -110,8 +110,8 @@ def calls_for(args: argparse.Namespace) -> Iterator[tuple[Calls, int]]:
     if on_workers(args):
         refuse(args, ["jobs"], ": is for this machine; --workers has its own")
         with client_of(args) as client:
-            count = len(check_workers(client, None))
-            yield WorkerCalls(client).finished, count
+            calls = WorkerCalls(client)
+            yield calls.finished, calls.workers
         return
     from ..orders.solve.jobs import calls_in, processes
 

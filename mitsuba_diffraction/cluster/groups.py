@@ -9,15 +9,16 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from ..errors import DiffractionError, counted
 from ..progress import Progress
 from ..scene.passes import Span, Stop
+from .calls import Contents, UnderWay, submitted
 from .kept import Kept
 from .tasks import Failed, Sums, Task, add_sums, run_task
-from .workers import Headcount, outcome, wait_for_scheduler
+from .workers import Headcount
 
 #: Groups of a job, at most, unless it has more frames: a client that is killed loses 1/64 of the
 #: work, and 64 sums are little to receive.
@@ -71,16 +72,6 @@ class Stopped(Exception):
     """The command was asked to stop."""
 
 
-@dataclass
-class _Group:
-    """A group with workers: futures of its tasks and of its sum."""
-
-    passes: Task
-    task_size: int
-    tasks: dict[Span, Any] = field(default_factory=dict)
-    sum: Any = None
-
-
 def group_size(passes: int, frames: int) -> int:
     """Return the passes of a group, a power of two; frames may have fewer."""
     return 1 << (-(-passes // max(GROUPS, frames)) - 1).bit_length()
@@ -125,8 +116,7 @@ class Groups:
         self._client, self._kept, self._frames = client, kept, frames
         self._headcount, self._report, self._stop = headcount, report, stop
         self._progress = progress
-        self._contents: dict[str, Any] = {}
-        self._under_way: list[_Group] = []
+        self._under_way = UnderWay[Task](client, report, stop)
         # of each frame: the groups that it is added from, and those that are on disk
         self._spans: list[set[Span]] = []
         self._stored = [kept.spans(frame) for frame in frames]
@@ -174,69 +164,47 @@ class Groups:
 
     def cancel(self) -> None:
         """Cancel tasks whose results nobody waits for."""
-        for group in self._under_way:
-            self._client.cancel([*group.tasks.values(), group.sum])
-        self._under_way.clear()
+        self._under_way.cancel()
 
     def _give_out(self) -> None:
         workers = max(1, self._headcount.now())
         size = task_size(self._total, len(self._frames), workers)
-        tasks = sum(len(group.tasks) for group in self._under_way)
-        while self._waiting and tasks < AHEAD * workers:
-            group = _Group(self._waiting.pop(), size)
-            self._submit(group)
-            self._under_way.append(group)
-            tasks += len(group.tasks)
+        while self._waiting and len(self._under_way) < AHEAD * workers:
+            group = self._waiting.pop()
+            self._under_way.give_out(group, partial(self._submitted, group, size, {}), group.files)
 
-    def _submit(self, group: _Group, lacking: Sequence[str] = ()) -> None:
-        """Submit the additions, and the tasks that no worker has or has done.
+    def _submitted(
+        self, group: Task, size: int, tasks: dict[Span, Any], contents: Contents
+    ) -> list[Any]:
+        """Submit the additions of a group, and the tasks that no worker has or has done.
 
-        The futures of tasks are held until the sum is here: where a worker dies, only what it had
-        rendered is rendered again.
+        tasks : futures of tasks, held until the sum is here: where a worker dies, only what it had
+            rendered is rendered again.
         """
-        client, task, size = self._client, group.passes, group.task_size
-        contents = {digest: self._content(task, digest) for digest in lacking}
 
         def sum_of(span: Span) -> Any:
             if span.count > size:
                 parts = [sum_of(part) for part in terms_of(span, size)]
                 # before other tasks: it takes sums out of the workers' memory
-                return client.submit(add_sums, parts, pure=False, priority=1)
-            future = group.tasks.get(span)
+                return submitted(self._client, add_sums, parts, priority=1)
+            future = tasks.get(span)
             if future is None or future.status not in ("pending", "finished"):
-                future = group.tasks[span] = client.submit(
-                    run_task, task.part(span), contents, pure=False, priority=-task.frame
+                future = tasks[span] = submitted(
+                    self._client, run_task, group.part(span), contents, priority=-group.frame
                 )
             return future
 
-        group.sum = sum_of(task.span)
-
-    def _content(self, task: Task, digest: str) -> Any:
-        """Return the content of a file as a task, which Dask repeats where its result is lost."""
-        if digest not in self._contents:
-            path = next(path for path, other in task.files.files if other == digest)
-            self._contents[digest] = self._client.submit(
-                bytes, Path(path).read_bytes(), key=f"file-{digest[:32]}"
-            )
-        return self._contents[digest]
+        total = sum_of(group.span)
+        return [*(future for future in tasks.values() if future is not total), total]
 
     def _take(self) -> None:
-        for group in [group for group in self._under_way if group.sum.done()]:
-            answer, task = outcome(group.sum), group.passes
-            if isinstance(answer, Sums):
-                self._kept.write(self._frames[task.frame], task.span, answer)
-                self._stored[task.frame].add(task.span)
-                self._left -= task.span.count
-                self._under_way.remove(group)
-                self._report.add(answer)
-            elif isinstance(answer, Failed):
-                raise DiffractionError(f"{task}, {answer}")
-            else:
-                if answer is None:
-                    self._contents.clear()
-                    wait_for_scheduler(self._client, self._stop)
-                self._report.retries += 1
-                self._submit(group, answer.digests if answer else ())
+        for group, answer in self._under_way.finished():
+            if isinstance(answer, Failed):
+                raise DiffractionError(f"{group}, {answer}")
+            self._kept.write(self._frames[group.frame], group.span, answer)
+            self._stored[group.frame].add(group.span)
+            self._left -= group.span.count
+            self._report.add(answer)
 
 
 def _cut(span: Span, size: int, stored: set[Span]) -> Iterator[Span]:

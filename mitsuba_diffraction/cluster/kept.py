@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import one_line, warn
 from ..scene.passes import Span
-from ..tables.store import Record, read_record, write_record
+from ..tables.store import Record, found, write_record
 from .tasks import Sums, Task
 
 
@@ -18,11 +16,10 @@ class Kept:
     Parameters
     ----------
     folder : where the files lie, one for each sum of a frame's passes.
-    warn : called with a line for each damaged file.
     """
 
-    def __init__(self, folder: Path, warn: Callable[[str], None] = warn) -> None:
-        self.folder, self._warn = folder, warn
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
 
     def spans(self, frame: Task) -> set[Span]:
         """Return the passes of a frame whose sums are stored."""
@@ -37,16 +34,11 @@ class Kept:
 
     def read(self, frame: Task, span: Span) -> Sums | None:
         """Read a sum; None if it is missing, or damaged, which is removed."""
-        file = self._file(frame, span)
-        try:
-            record = read_record(file, _title(frame, span))
+
+        def sums_in(record: Record) -> Sums:
             return Sums(raw=record.arrays[0], **record.document)
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
-            self._warn(f"'{file}' is damaged ({one_line(str(error))[:100]}) and rendered again")
-            file.unlink(missing_ok=True)
-            return None
+
+        return found(self._file(frame, span), _title(frame, span), sums_in)
 
     def forget(self, frame: Task) -> None:
         """Remove the sums of a frame whose picture is written."""

@@ -8,15 +8,15 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from typing import Any
 
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError, one_line, warn
 from ..extras import optional
 from ..scene import set_variant
-from ..scene.passes import Stop
-from .tasks import Failed, MissingFiles, check_versions, versions
+from ..system import environment
+from .tasks import called, versions
 
 #: Names a running cluster, as Dask has it.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
@@ -24,10 +24,7 @@ VARIABLE = "DASK_SCHEDULER_ADDRESS"
 PATIENCE = 60.0
 #: Seconds between counts of the workers.
 COUNT_EVERY = 2.0
-GONE = (
-    "the scheduler is gone; start it and its workers, and run the same command again, which goes "
-    "on from the stored results"
-)
+_WARNINGS = "PYTHONWARNINGS"
 
 
 @contextlib.contextmanager
@@ -61,8 +58,10 @@ def connect(
             "distributed.worker.profile.enabled": False,
         }
         with dask.config.set(settings):
+            # Python's tracker of semaphores, which starts inside, is silent at an abrupt end
+            said = filter(None, [os.environ.get(_WARNINGS), "ignore:resource_tracker:UserWarning"])
             # the processes that are started ignore Ctrl-C: it is for the client
-            with _ctrl_c_ignored(), _silent_tracker():
+            with _ctrl_c_ignored(), environment({_WARNINGS: ",".join(said)}):
                 cluster = distributed.LocalCluster(
                     n_workers=count, threads_per_worker=1, processes=True, host="127.0.0.1",
                     dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
@@ -115,12 +114,14 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
                 f"worker {address} has {about['nthreads']} Dask threads, of which Dr.Jit takes one "
                 "at a time: start it with 'dask worker --nthreads 1'"
             )
-    reasons = client.run(trouble_of_process, versions(), variant, on_error="return")
-    answers = {a: trouble for a, trouble in reasons.items() if not isinstance(trouble, OSError)}
-    for address, trouble in answers.items():  # the others have just gone
-        if trouble is not None:
-            raise DiffractionError(f"worker {address} is of no use: {one_line(str(trouble))}")
-    return list(answers)
+    asked = (str,) if variant is None else (set_variant, variant)
+    answers = client.run(called, versions(), *asked, on_error="return")
+    for address, answer in answers.items():
+        if isinstance(answer, Exception) and not isinstance(answer, OSError):
+            reason = one_line(str(getattr(answer, "text", answer)))
+            raise DiffractionError(f"worker {address} is of no use: {reason}")
+    # the others have just gone
+    return [address for address, answer in answers.items() if not isinstance(answer, OSError)]
 
 
 def workers_of(client: Any) -> dict[str, Any]:
@@ -139,12 +140,11 @@ class Headcount:
     Parameters
     ----------
     client : `distributed.Client`.
-    there : addresses of the workers at the start.
     """
 
-    def __init__(self, client: Any, there: Iterable[str]) -> None:
-        self._client, self._seen, self._there = client, set(there), set(there)
-        self._time = time.monotonic()
+    def __init__(self, client: Any) -> None:
+        self._client, self._seen = client, set[str]()
+        self.lost()
 
     def now(self) -> int:
         """Return the number of workers."""
@@ -159,50 +159,15 @@ class Headcount:
         return len(self._seen - self._there)
 
 
-def outcome(future: Any) -> Any:
-    """Return the result of a task, or its error: `MissingFiles`, or `Failed`, also if its workers
-    died. None if the scheduler lost it."""
-    distributed = optional("distributed")
-    try:
-        return future.result()
-    except (Failed, MissingFiles) as error:
-        return error
-    except distributed.scheduler.KilledWorker as error:
-        reason = "it died, as did those before that had the same task; a worker may lack memory"
-        return Failed(f"{reason}, see docs/cluster.md", error.last_worker.address)
-    except (CancelledError, distributed.client.FutureCancelledError, OSError):
-        return None
-
-
-def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
-    """Wait until the scheduler answers again, or `stop` is asked."""
-    end = time.monotonic() + PATIENCE
-    while client.status != "running" and not (stop and stop.asked):
-        if client.status == "closed" or time.monotonic() > end:
-            raise DiffractionError(GONE)
-        time.sleep(0.1)
-
-
-def memory_warnings(client: Any, needed: float) -> Iterator[str]:
-    """Yield lines on workers whose memory limit is below the estimated need of a task, in bytes."""
+def warn_of_memory(client: Any, needed: float) -> None:
+    """Warn of workers whose memory limit is below the estimated need of a task, in bytes."""
     for address, about in workers_of(client).items():
         limit = about.get("memory_limit") or 0
         if 0 < limit < needed:
-            yield (
+            warn(
                 f"worker {address} may use {limit / 1e9:.2g} GB, and a task is estimated to need "
                 f"{needed / 1e9:.2g} GB; start fewer workers, or smaller pictures"
             )
-
-
-def trouble_of_process(wanted: tuple[str, ...], variant: str | None) -> str | None:
-    """Return the reason why this process cannot serve, or None."""
-    try:
-        check_versions(wanted)
-        if variant is not None:
-            set_variant(variant)
-    except DiffractionError as error:
-        return str(error)
-    return None
 
 
 def _apart(distributed: Any) -> Any:
@@ -217,21 +182,6 @@ def _apart(distributed: Any) -> Any:
                 os.setsid()
 
     return Apart()
-
-
-@contextlib.contextmanager
-def _silent_tracker() -> Iterator[None]:
-    """Silence Python's tracker of semaphores, which starts inside, at a client's abrupt end."""
-    name, before = "PYTHONWARNINGS", os.environ.get("PYTHONWARNINGS")
-    line = "ignore:resource_tracker:UserWarning"
-    os.environ[name] = f"{before},{line}" if before else line
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
 
 
 @contextlib.contextmanager

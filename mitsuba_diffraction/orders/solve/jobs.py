@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from ...arrays import Complex, Real
 from ...errors import DiffractionError, check_choice, one_line
 from ...progress import Progress, silent
-from ...tables.store import Record, read_record, write_record
+from ...system import environment
+from ...tables.store import Record, found, write_record
 from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
 from .crossed import CrossedWaves
@@ -275,8 +276,9 @@ class Jobs:
         names = _names(problem, places)
         if self.folder is not None:
             for name in names.values():
-                if name not in self._known and (solved := _read(self._file(name), name)):
-                    self._known[name] = solved
+                if name not in self._known:
+                    solved = found(self._file(name), _title(name), _solved_in)
+                    self._known |= {name: solved} if solved else {}
         return [place for place, name in names.items() if name not in self._known]
 
     def _file(self, name: str) -> Path:
@@ -312,11 +314,10 @@ def processes(count: int) -> Iterator[Executor]:
 
     Raises a DiffractionError if one of them is killed.
     """
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
     pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin)
     try:
-        yield pool
+        with environment(dict.fromkeys(_THREADS, "1")):
+            yield pool
     except BrokenExecutor as error:
         raise DiffractionError(
             "a process was killed, maybe for lack of memory; use fewer of them, and run the same "
@@ -329,11 +330,6 @@ def processes(count: int) -> Iterator[Executor]:
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _begin() -> None:
@@ -371,15 +367,12 @@ def remove_results(folder: Path) -> None:
         folder.rmdir()
 
 
-def _read(file: Path, name: str) -> Solved | None:
-    """Return a stored result; None if there is none, or a damaged one, which is solved again."""
-    try:
-        record = read_record(file, _title(name))
-        (values,) = record.arrays
-        solved = Solved(values, float(record.document["seconds"]))
-        return solved if np.isfinite(values).all() else None
-    except (OSError, ValueError, LookupError, TypeError, MemoryError, RecursionError):
-        return None
+def _solved_in(record: Record) -> Solved:
+    """Return a stored result; raises a ValueError if a number of it is not finite."""
+    (values,) = record.arrays
+    if not np.isfinite(values).all():
+        raise ValueError("a number is not finite")
+    return Solved(values, float(record.document["seconds"]))
 
 
 def _title(name: str) -> str:
