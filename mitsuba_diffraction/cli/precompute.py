@@ -95,7 +95,8 @@ def _built(
         return build_with(fields, settings, bar), {}
     with client_of(args) as client:
         calls = WorkerCalls(client)
-        return build_with(fields, settings, bar, calls), calls.summary()
+        table, work = build_with(fields, settings, bar, calls), calls.report
+        return table, {"tasks": work.tasks, "retries": work.retries, "busy": work.busy}
 
 
 def _report(

@@ -18,10 +18,11 @@ from ..progress import Progress, silent
 from ..scene import load_scene, set_variant
 from ..scene.load import preview_samples, sensor_of
 from ..scene.passes import Result, Span, Stop, added, developed, integrator_of, passes_of
-from .groups import Groups, Report, Stopped, sums_in_worker
+from .calls import Report
+from .groups import Groups, Stopped, sums_in_worker
 from .kept import Kept
 from .tasks import SceneFiles, Task, film_of
-from .workers import Headcount, check_workers, warn_of_memory
+from .workers import check_workers, warn_of_memory
 
 #: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
 BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
@@ -127,7 +128,6 @@ class FrameSequence:
         threads: int = 0,
     ) -> None:
         check_workers(client, variant)
-        self._headcount = Headcount(client)
         self.report = Report()
         self._client, self._kept = client, Kept(keep)
         self.scene = load_scene(scene, frames[0].values)
@@ -163,16 +163,13 @@ class FrameSequence:
         work is stored.
         """
         start = time.perf_counter()
-        groups = Groups(
-            self._client, self._kept, self.frames, self._headcount, self.report, stop, progress
-        )
+        groups = Groups(self._client, self._kept, self.frames, self.report, stop, progress)
         try:
             for frame in self.frames:
                 total = added(frame.span, partial(groups.sum_of, frame))
                 spp = sum(each.spp for each in frame.passes)
                 picture = developed(self.scene, self.sensor, total.raw, spp)
                 self.report.where.update(total.where)
-                self.report.seconds = time.perf_counter() - start
                 yield Result(picture, spp, stop.asked)
                 self._kept.forget(frame)
                 if stop.asked:
@@ -180,8 +177,8 @@ class FrameSequence:
         except Stopped:
             return
         finally:
-            groups.cancel()
-            self.report.lost = self._headcount.lost()
+            groups.under_way.cancel()
+            self.report.lost = groups.under_way.lost()
             self.report.seconds = time.perf_counter() - start
             if len(self.report.where) > 1:
                 warn(

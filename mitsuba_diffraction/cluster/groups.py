@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 from ..errors import DiffractionError, counted
 from ..progress import Progress
 from ..scene.passes import Span, Stop
-from .calls import Contents, UnderWay, submitted
+from .calls import Contents, Report, UnderWay, submitted
 from .kept import Kept
 from .tasks import Failed, Sums, Task, add_sums, run_task
-from .workers import Headcount
 
 #: Groups of a job, at most, unless it has more frames: a client that is killed loses 1/64 of the
 #: work, and 64 sums are little to receive.
@@ -30,42 +28,6 @@ AHEAD = 8
 #: Sums that a worker adds at once.
 ADDED = 4
 _POLL = 0.05  # seconds
-
-
-@dataclass
-class Report:
-    """Cost of a run on workers."""
-
-    tasks: int = 0  # that workers did
-    groups: int = 0  # sums of passes that came from workers
-    kept: int = 0  # sums that had been stored by an earlier run
-    # groups that were given out again, since the scheduler or a worker's files were lost; tasks of
-    # a worker that died are given to others by the scheduler
-    retries: int = 0
-    lost: int = 0  # workers that were there and are not any more
-    seconds: float = 0.0  # wall time of the client
-    busy: float = 0.0  # seconds of all workers' work
-    bytes: int = 0  # size of the sums that came from workers
-    peak: int = 0  # bytes of memory that a worker has taken at most
-    # workers, where: addresses, and processors with threads, of what has been added up
-    workers: set[str] = field(default_factory=set)
-    where: set[str] = field(default_factory=set)
-
-    def summary(self) -> dict[str, Any]:
-        """Return plain data, with the time that a task costs besides its work."""
-        plain = {k: sorted(v) if isinstance(v, set) else v for k, v in vars(self).items()}
-        count = len(self.workers) or 1
-        idle = self.seconds * count - self.busy
-        return plain | {"overhead_per_task_s": idle / self.tasks if self.tasks else 0.0}
-
-    def add(self, sums: Sums) -> None:
-        """Count a sum that came from workers."""
-        self.groups += 1
-        self.tasks += sums.tasks
-        self.busy += sums.seconds
-        self.bytes += sums.raw.nbytes
-        self.peak = max(self.peak, sums.peak)
-        self.workers.update(sums.workers)
 
 
 class Stopped(Exception):
@@ -103,33 +65,29 @@ class Groups:
     client : `distributed.Client`.
     kept : sums on disk.
     frames : in the order in which their sums are waited for.
-    headcount : of the workers.
     report : is added to.
     stop : asked, it ends the wait.
     progress : called as progress(passes done, passes in all, text).
     """
 
     def __init__(
-        self, client: Any, kept: Kept, frames: Sequence[Task], headcount: Headcount,
-        report: Report, stop: Stop, progress: Progress,
+        self, client: Any, kept: Kept, frames: Sequence[Task], report: Report, stop: Stop,
+        progress: Progress,
     ) -> None:  # fmt: skip
         self._client, self._kept, self._frames = client, kept, frames
-        self._headcount, self._report, self._stop = headcount, report, stop
-        self._progress = progress
-        self._under_way = UnderWay[Task](client, report, stop)
-        # of each frame: the groups that it is added from, and those that are on disk
-        self._spans: list[set[Span]] = []
-        self._stored = [kept.spans(frame) for frame in frames]
-        self._waiting: list[Task] = []
+        self._report, self._stop, self._progress = report, stop, progress
+        self.under_way = UnderWay[Task](client, report)
         self._total = sum(frame.span.count for frame in frames)
         size = group_size(self._total, len(frames))
-        for frame, stored in zip(frames, self._stored, strict=True):
+        # whether a group is on disk, by the number of its frame and its passes
+        self._stored: dict[tuple[int, Span], bool] = {}
+        self._waiting: list[Task] = []
+        for frame in reversed(frames):
+            stored = kept.spans(frame)
             spans = list(_cut(frame.span, size, stored))
-            self._spans.append(set(spans))
-            self._waiting += [frame.part(span) for span in spans if span not in stored]
-            report.kept += len(stored)
-        self._waiting.reverse()
-        self._left = sum(task.span.count for task in self._waiting)
+            self._stored |= {(frame.frame, span): span in stored for span in spans}
+            self._waiting += [frame.part(span) for span in reversed(spans) if span not in stored]
+        report.kept = sum(self._stored.values())
 
     def sum_of(self, frame: Task, span: Span) -> Sums | None:
         """Wait for the sum of a group; None for single passes.
@@ -142,36 +100,32 @@ class Groups:
             Naming frame, passes and worker, if a task fails.
         """
         number = frame.frame
-        if span not in self._spans[number]:
+        if (number, span) not in self._stored:
             return None
         while True:
-            if span in self._stored[number]:
+            if self._stored[number, span]:
                 sums = self._kept.read(frame, span)
                 if sums is not None:
                     return sums
-                self._stored[number].remove(span)
+                self._stored[number, span] = False
                 self._report.kept -= 1
-                self._left += span.count
                 self._waiting.append(frame.part(span))
             if self._stop.asked:
                 raise Stopped
             self._give_out()
             self._take()
             what = f"frame {number + 1} of {len(self._frames)}, " if len(self._frames) > 1 else ""
-            text = f"{what}{counted(self._headcount.now(), 'worker')}"
-            self._progress(self._total - self._left, self._total, text)
+            text = f"{what}{counted(self.under_way.workers(), 'worker')}"
+            done = sum(span.count for (_, span), stored in self._stored.items() if stored)
+            self._progress(done, self._total, text)
             time.sleep(_POLL)
 
-    def cancel(self) -> None:
-        """Cancel tasks whose results nobody waits for."""
-        self._under_way.cancel()
-
     def _give_out(self) -> None:
-        workers = max(1, self._headcount.now())
+        workers = max(1, self.under_way.workers())
         size = task_size(self._total, len(self._frames), workers)
-        while self._waiting and len(self._under_way) < AHEAD * workers:
+        while self._waiting and len(self.under_way) < AHEAD * workers:
             group = self._waiting.pop()
-            self._under_way.give_out(group, partial(self._submitted, group, size, {}), group.files)
+            self.under_way.give_out(group, partial(self._submitted, group, size, {}), group.files)
 
     def _submitted(
         self, group: Task, size: int, tasks: dict[Span, Any], contents: Contents
@@ -198,12 +152,11 @@ class Groups:
         return [*(future for future in tasks.values() if future is not total), total]
 
     def _take(self) -> None:
-        for group, answer in self._under_way.finished():
+        for group, answer in self.under_way.finished():
             if isinstance(answer, Failed):
                 raise DiffractionError(f"{group}, {answer}")
             self._kept.write(self._frames[group.frame], group.span, answer)
-            self._stored[group.frame].add(group.span)
-            self._left -= group.span.count
+            self._stored[group.frame, group.span] = True
             self._report.add(answer)
 
 

@@ -14,9 +14,9 @@ from ..progress import Progress
 from ..settings import TableSettings
 from ..tables import DiffractionTable
 from ..tables.build.build import build_with
-from .calls import Contents, UnderWay, submitted
+from .calls import Contents, Report, UnderWay, submitted
 from .tasks import Failed
-from .workers import Headcount, check_workers
+from .workers import check_workers
 
 _POLL = 0.005  # seconds
 #: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
@@ -62,18 +62,12 @@ class WorkerCalls:
     Attributes
     ----------
     workers : number at the start.
-    tasks, retries : that were done, and given out again when files or the scheduler were lost.
-    busy : seconds of all workers' work.
+    report : its tasks, retries, and seconds of work.
     """
 
     def __init__(self, client: Any, variant: str | None = None) -> None:
         self._client, self.workers = client, len(check_workers(client, variant))
-        self.tasks = self.retries = 0
-        self.busy = 0.0
-
-    def summary(self) -> dict[str, Any]:
-        """Return the cost as plain data."""
-        return {name: getattr(self, name) for name in ("tasks", "retries", "busy")}
+        self.report = Report()
 
     def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
         """Yield results in the order of the arguments, a few of which are at work at once.
@@ -88,7 +82,7 @@ class WorkerCalls:
                 wanted += 1
 
     def finished(
-        self, work: Callable[[Any], Any], arguments: Iterable[Any], early: Sized | None = None
+        self, work: Callable[[Any], Any], arguments: Iterable[Any], early: Sized = ()
     ) -> Iterator[tuple[int, Any]]:
         """Yield results as `answers` does, and raise a DiffractionError if a call fails, too."""
         for n, result in self.answers(work, arguments, early):
@@ -97,7 +91,7 @@ class WorkerCalls:
             yield n, result
 
     def answers(
-        self, work: Callable[..., Any], arguments: Iterable[Any], early: Sized | None = None
+        self, work: Callable[..., Any], arguments: Iterable[Any], early: Sized = ()
     ) -> Iterator[tuple[int, Any]]:
         """Yield the number and the result of each call as it finishes.
 
@@ -108,20 +102,18 @@ class WorkerCalls:
         work : called with an argument; with the argument and contents of files, once it has raised
             `MissingFiles`.
         arguments : have `files`, `SceneFiles`, if the work needs files.
-        early : results that wait for others; None gives out all calls at once.
+        early : results that wait for others.
 
         Returns
         -------
         Numbers and results; `Failed` for an error, or a worker that died of a call again and again.
         """
         left = enumerate(arguments)
-        headcount, calls = Headcount(self._client), UnderWay[int](self._client, self)
+        calls = UnderWay[int](self._client, self.report)
         try:
             while True:
-                room = None
-                if early is not None:
-                    room = max(0, _AHEAD * max(1, headcount.now()) - len(calls) - len(early))
-                for n, argument in itertools.islice(left, room):
+                room = _AHEAD * max(1, calls.workers()) - len(calls) - len(early)
+                for n, argument in itertools.islice(left, max(0, room)):
                     give = partial(self._submitted, work, argument)
                     calls.give_out(n, give, getattr(argument, "files", None))
                 if not calls:
@@ -131,8 +123,8 @@ class WorkerCalls:
                         yield n, answer
                         continue
                     result, seconds = answer
-                    self.tasks += 1
-                    self.busy += seconds
+                    self.report.tasks += 1
+                    self.report.busy += seconds
                     yield n, result
                 time.sleep(_POLL)
         finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..scene.passes import Span
@@ -10,6 +11,7 @@ from ..tables.store import Record, found, write_record
 from .tasks import Sums, Task
 
 
+@dataclass(frozen=True)
 class Kept:
     """Folder of sums on disk, created when the first comes and removed when it is empty.
 
@@ -18,8 +20,7 @@ class Kept:
     folder : where the files lie, one for each sum of a frame's passes.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    folder: Path
 
     def spans(self, frame: Task) -> set[Span]:
         """Return the passes of a frame whose sums are stored."""

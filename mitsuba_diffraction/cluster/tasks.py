@@ -220,7 +220,7 @@ class SceneFiles:
         """Read the digests of the files of an XML scene."""
         absolute = Path(os.path.abspath(scene))
         paths = {os.path.abspath(path) for path in files_of(absolute, values)}
-        files = tuple((path, _digest(path, *_stamp(path))) for path in sorted(paths))
+        files = tuple((path, _digest(path)) for path in sorted(paths))
         return cls(str(absolute), tuple(sorted(values.items())), files)
 
     @property
@@ -284,18 +284,18 @@ def _own_temporary() -> Path:
 
 def _has(path: str | Path, digest: str) -> bool:
     try:
-        return _digest(str(path), *_stamp(path)) == digest
+        return _digest(path) == digest
     except OSError:
         return False
 
 
-def _stamp(path: str | Path) -> tuple[int, int]:
+def _digest(path: str | Path) -> str:
+    """Return the SHA-256 of a file, read again only when its time or size has changed."""
     status = os.stat(path)
-    return status.st_mtime_ns, status.st_size
+    return _digest_of(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(4096)
-def _digest(path: str, *stamp: int) -> str:
-    """Return the SHA-256 of a file, read again only when its time or size has changed."""
+def _digest_of(path: str | Path, *stamp: int) -> str:
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -7,7 +7,6 @@ import logging
 import os
 import signal
 import threading
-import time
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from typing import Any
@@ -22,9 +21,10 @@ from .tasks import called, versions
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
 #: Seconds for the first worker to come, and for a scheduler that was lost.
 PATIENCE = 60.0
-#: Seconds between counts of the workers.
-COUNT_EVERY = 2.0
-_WARNINGS = "PYTHONWARNINGS"
+# Text that a worker runs, twice, as it starts; one that leads its session is not in the way
+_LEAVE = (
+    "import contextlib, os\nwith contextlib.suppress(OSError, AttributeError):\n    os.setsid()"
+)
 
 
 @contextlib.contextmanager
@@ -56,18 +56,20 @@ def connect(
             "distributed.deploy.lost-worker-timeout": "10 minutes",
             # it looks at a worker's stack a hundred times a second, which costs 6 % of its time
             "distributed.worker.profile.enabled": False,
+            # Mitsuba answers Ctrl-C itself while it renders, and a scalar variant leaves its pass
+            # unfinished: workers leave the terminal's reach, late ones too
+            "distributed.worker.preload": [_LEAVE],
         }
         with dask.config.set(settings):
             # Python's tracker of semaphores, which starts inside, is silent at an abrupt end
-            said = filter(None, [os.environ.get(_WARNINGS), "ignore:resource_tracker:UserWarning"])
+            silent = f"{os.environ.get('PYTHONWARNINGS', '')},ignore:resource_tracker:UserWarning"
             # the processes that are started ignore Ctrl-C: it is for the client
-            with _ctrl_c_ignored(), environment({_WARNINGS: ",".join(said)}):
+            with _ctrl_c_ignored(), environment({"PYTHONWARNINGS": silent}):
                 cluster = distributed.LocalCluster(
                     n_workers=count, threads_per_worker=1, processes=True, host="127.0.0.1",
                     dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
                 )  # fmt: skip
             with cluster, distributed.Client(cluster) as client:
-                client.register_plugin(_apart(distributed))
                 yield client
         return
     address = scheduler or os.environ.get(VARIABLE)
@@ -101,10 +103,9 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
     client : `distributed.Client`.
     variant : of Mitsuba that they have to work in; None where that does not matter.
     """
-    distributed = optional("distributed")
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
-    except (TimeoutError, distributed.TimeoutError) as error:
+    except TimeoutError as error:
         raise DiffractionError(
             f"no worker came within {PATIENCE:.0f} s; start some with 'dask worker --nthreads 1'"
         ) from error
@@ -134,31 +135,6 @@ def workers_of(client: Any) -> dict[str, Any]:
         return {}
 
 
-class Headcount:
-    """Number of workers, counted every `COUNT_EVERY` seconds.
-
-    Parameters
-    ----------
-    client : `distributed.Client`.
-    """
-
-    def __init__(self, client: Any) -> None:
-        self._client, self._seen = client, set[str]()
-        self.lost()
-
-    def now(self) -> int:
-        """Return the number of workers."""
-        if time.monotonic() - self._time > COUNT_EVERY:
-            self.lost()
-        return len(self._there)
-
-    def lost(self) -> int:
-        """Count now, and return how many workers were there and are not any more."""
-        self._time, self._there = time.monotonic(), set(workers_of(self._client))
-        self._seen |= self._there
-        return len(self._seen - self._there)
-
-
 def warn_of_memory(client: Any, needed: float) -> None:
     """Warn of workers whose memory limit is below the estimated need of a task, in bytes."""
     for address, about in workers_of(client).items():
@@ -168,20 +144,6 @@ def warn_of_memory(client: Any, needed: float) -> None:
                 f"worker {address} may use {limit / 1e9:.2g} GB, and a task is estimated to need "
                 f"{needed / 1e9:.2g} GB; start fewer workers, or smaller pictures"
             )
-
-
-def _apart(distributed: Any) -> Any:
-    """Return a plugin that takes workers out of the terminal's reach, late ones too.
-
-    Mitsuba answers Ctrl-C itself while it renders, and a scalar variant leaves its pass unfinished.
-    """
-
-    class Apart(distributed.WorkerPlugin):
-        def setup(self, worker: Any) -> None:
-            with contextlib.suppress(OSError, AttributeError):  # leads one already; Windows
-                os.setsid()
-
-    return Apart()
 
 
 @contextlib.contextmanager

@@ -39,7 +39,7 @@ class _Workers:
         self.count, self.under_way, self.most = count, 0, 0
 
     def scheduler_info(self, **_):
-        return {"workers": dict.fromkeys(range(self.count), {"nthreads": 1})}
+        return {"workers": {key: {"nthreads": 1} for key in range(self.count)}}
 
     def wait_for_workers(self, *_, **__):
         pass

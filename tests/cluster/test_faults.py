@@ -21,7 +21,7 @@ from mitsuba_diffraction import (
     HeightField,
     cluster,
 )
-from mitsuba_diffraction.cluster import groups, workers
+from mitsuba_diffraction.cluster import calls, groups, workers
 from mitsuba_diffraction.cluster.jobs import WorkerCalls
 from mitsuba_diffraction.cluster.kept import Kept
 from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task
@@ -69,7 +69,7 @@ def test_two_workers_of_which_one_is_killed_build_the_same_table(client):
     assert table.digest() == alone.digest()
     assert table.error == alone.error
     assert table.source == alone.source
-    assert work.tasks > 10
+    assert work.report.tasks > 10
     client.wait_for_workers(2, timeout=300)
 
 
@@ -180,7 +180,7 @@ def free_port():
 def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
     scene, expected, start, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(workers, "COUNT_EVERY", 0.0)  # or a quick restart would not be seen
+    monkeypatch.setattr(calls, "COUNT_EVERY", 0.0)  # or a quick restart would not be seen
     monkeypatch.setattr(workers, "PATIENCE", 300.0)  # of a busy machine
     port = free_port()
     first, killed = start(port), []

@@ -12,6 +12,7 @@ from mitsuba_diffraction import DiffractionError, DiffractionWarning, cluster
 from mitsuba_diffraction.cluster import workers
 from tests.cluster.clusters import VARIANT, Recorder, film, rendered
 from tests.support.machine import python
+from tests.support.systems import posix
 
 pytestmark = pytest.mark.thorough
 
@@ -67,6 +68,11 @@ def test_workers_with_too_little_memory_are_named(scene, tmp_path):
     with pytest.warns(DiffractionWarning, match=words):
         job = film(Recorder(memory_limit=1e8), scene, tmp_path)
     assert job.needed > 5e8
+
+
+@posix
+def test_workers_are_out_of_the_terminal_s_reach(client):
+    assert os.getsid(0) not in client.run(os.getsid, 0).values()
 
 
 def test_pages_of_workers_are_for_this_machine_alone(client):
