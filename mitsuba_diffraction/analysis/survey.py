@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from PIL import Image
 
 from ..atomic import atomic_path
 from ..cluster.jobs import WorkerCalls
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
+from ..digests import key_of
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import readable_file
 from ..heights import Source
@@ -34,7 +34,6 @@ from ..plugin.dictionary import bsdf_dict
 from ..progress import Progress, silent
 from ..scene import set_variant
 from ..tables import DiffractionTable, TableSource
-from ..tables.store import key_of
 from .crops import crops_of
 from .iridescence import WINDOW, MaterialFactor, light_and_chance
 from .maps import brdf_map
@@ -110,9 +109,7 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
 
 def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     """Fill the row of a scan, so far as no error ends it, and return table and map."""
-    set_variant(job.variant)
-    if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
-        dr.set_thread_count(job.threads)
+    set_variant(job.variant, job.threads)
     path, _ = job.files.here()
     with warnings.catch_warnings(record=True) as overrides:
         warnings.simplefilter("always", DiffractionWarning)

@@ -18,6 +18,7 @@ from .workers import workers_of
 
 #: Seconds between counts of the workers.
 COUNT_EVERY = 2.0
+_POLL = 0.01  # seconds
 
 Key = TypeVar("Key")
 #: Contents of files that a worker lacks, by digest: futures, which Dask replaces by their results.
@@ -99,13 +100,14 @@ class UnderWay(Generic[Key]):
         self._calls[key] = give({}), give, files
 
     def finished(self) -> Iterator[tuple[Key, Any]]:
-        """Yield the keys and the results of calls that are done, without waiting.
+        """Wait a moment, and yield the keys and the results of calls that are done.
 
         A result is `Failed` after an error, or if workers died of a call again and again.
 
         Raises a DiffractionError if the scheduler is gone, and does not come back.
         """
         distributed = optional("distributed")
+        time.sleep(_POLL)
         done = [(key, call) for key, call in self._calls.items() if call[0][-1].done()]
         for key, (futures, give, files) in done:
             answer, contents = None, {}

@@ -6,7 +6,6 @@ tasks, which are smaller parts, and add up their sums. How passes are grouped ch
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -27,7 +26,6 @@ TASKS_A_WORKER = 10
 AHEAD = 8
 #: Sums that a worker adds at once.
 ADDED = 4
-_POLL = 0.05  # seconds
 
 
 class Stopped(Exception):
@@ -118,7 +116,6 @@ class Groups:
             text = f"{what}{counted(self.under_way.workers(), 'worker')}"
             done = sum(span.count for (_, span), stored in self._stored.items() if stored)
             self._progress(done, self._total, text)
-            time.sleep(_POLL)
 
     def _give_out(self) -> None:
         workers = max(1, self.under_way.workers())

@@ -1,4 +1,4 @@
-"""Independent jobs, here or on workers: scans as they finish, windows in order."""
+"""Independent jobs on workers: scans and gratings as they finish, windows in order."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from .calls import Contents, Report, UnderWay, submitted
 from .tasks import Failed
 from .workers import check_workers
 
-_POLL = 0.005  # seconds
 #: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
 _AHEAD = 2
 
@@ -126,7 +125,6 @@ class WorkerCalls:
                     self.report.tasks += 1
                     self.report.busy += seconds
                     yield n, result
-                time.sleep(_POLL)
         finally:
             calls.cancel()
 

@@ -6,7 +6,6 @@ Scene files are identified by content: used in place, or copied to workers that 
 from __future__ import annotations
 
 import atexit
-import hashlib
 import os
 import shutil
 import tempfile
@@ -19,17 +18,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path
+from ..digests import key_of, sha256_of
 from ..errors import DiffractionError, counted, one_line
 from ..scene.load import load_scene, sensor_of, set_variant
 from ..scene.parameters import files_of
 from ..scene.passes import Pass, Span, added, integrator_of, render_pass
 from ..system import cores, peak_memory, processor
-from ..tables.store import cache_folder, key_of
+from ..tables.store import cache_folder
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
 
@@ -124,9 +123,7 @@ def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums:
     start = time.perf_counter()
     task.files.require(contents or {})
     threads = task.threads or cores()
-    set_variant(task.variant)  # per process and thread: mitsuba3 #1685
-    if task.variant.startswith("llvm") and dr.thread_count() != threads:
-        dr.set_thread_count(threads)
+    set_variant(task.variant, threads)  # per process and thread: mitsuba3 #1685
 
     def sum_of(span: Span) -> Any:
         if span.count > 1:
@@ -292,10 +289,9 @@ def _has(path: str | Path, digest: str) -> bool:
 def _digest(path: str | Path) -> str:
     """Return the SHA-256 of a file, read again only when its time or size has changed."""
     status = os.stat(path)
-    return _digest_of(path, status.st_mtime_ns, status.st_size)
+    return _digest_at(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(4096)
-def _digest_of(path: str | Path, *stamp: int) -> str:
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _digest_at(path: str | Path, *stamp: int) -> str:
+    return sha256_of(path)

@@ -71,11 +71,6 @@ class Record:
     arrays: Sequence[NDArray[Any]]
 
 
-def key_of(*parts: Any) -> str:
-    """Return a key: the SHA-256 of its parts as JSON."""
-    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
-
-
 def cached(
     kind: str,
     key: str,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import stat
+from concurrent.futures import CancelledError
 
 import numpy as np
 import pytest
@@ -72,6 +73,27 @@ def test_few_tasks_are_under_way_however_many_there_are():
     client = _Workers(3)
     assert list(WorkerCalls(client)(abs, range(-50, 0))) == list(range(50, 0, -1))
     assert client.most == 6
+
+
+class _Losing(_Workers):
+    """Workers that are lost with every third call."""
+
+    def submit(self, *call, **how):
+        future = super().submit(*call, **how)
+        self.given = getattr(self, "given", 0) + 1
+        if self.given % 3 == 0:
+            future.work = _lost
+        return future
+
+
+def _lost(*_):
+    raise CancelledError
+
+
+def test_calls_that_were_lost_are_given_out_again():
+    calls = WorkerCalls(_Losing(2))
+    assert sorted(calls.finished(abs, [-1, -2, -3, -4])) == [(0, 1), (1, 2), (2, 3), (3, 4)]
+    assert (calls.report.tasks, calls.report.retries) == (4, 1)
 
 
 def test_an_error_on_a_worker_is_one_line_with_its_name():
