@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
 from ..cluster.jobs import WorkerCalls
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..digests import key_of
@@ -257,7 +257,7 @@ def run_survey(
         raise DiffractionError("there is no scan to survey; name files")
     calls = None if client is None else WorkerCalls(client, variant)
     scans = folder / SCANS
-    scans.mkdir(parents=True, exist_ok=True)
+    make_folder(scans)
     shown = tuple((surface or {}).items())
     named: list[dict[str, str]] = []
     rows: dict[int, dict[str, Any]] = {}  # those that are known, by their place in `named`

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..atomic import make_folder
 from ..errors import DiffractionError, counted
 from ..heights import HeightField, LoadOptions
 from ..heights.read import read_heights
@@ -140,7 +141,7 @@ def run(args: argparse.Namespace) -> Figures:
         # the folder that a recipe names is made
         check_outputs([output], make_folder=args.output is None)
         if args.output is None:
-            output.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(output.parent)
         table = solve_recipe(recipe, args)
     table.save(output)
     measured, table = table.digest(), load_orders(output)

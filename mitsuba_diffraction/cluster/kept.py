@@ -6,6 +6,7 @@ import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..atomic import make_folder
 from ..scene.passes import Span
 from ..tables.store import Record, found, write_record
 from .tasks import Sums, Task
@@ -29,7 +30,7 @@ class Kept:
 
     def write(self, frame: Task, span: Span, sums: Sums) -> None:
         """Write the sum of passes of a frame whole."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         about = {name: value for name, value in vars(sums).items() if name != "raw"}
         write_record(self._file(frame, span), _title(frame, span), Record(about, [sums.raw]))
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
 from ..digests import key_of, sha256_of
 from ..errors import DiffractionError, counted, one_line
 from ..scene.load import load_scene, sensor_of, set_variant
@@ -263,7 +263,7 @@ class SceneFiles:
 
 
 def _write(copy: Path, content: bytes) -> None:
-    copy.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(copy.parent)
     with atomic_path(copy) as temporary:
         temporary.write_bytes(content)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
 from ..errors import DiffractionError, counted, warn
 from ..extras import optional
 from ..files import refuse_pipe
@@ -150,7 +150,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, with_exr: bool) -> None:
     bad = count_bad(bitmap)
     if bad:
         warn(f"{frame.png}: {counted(bad, 'pixel')} not finite, and black")
-    frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
+    make_folder(frame.png.parent)  # not for a scene that fails
     if with_exr:
         write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": str(mi.variant())})
     # the PNG marks the frame as done

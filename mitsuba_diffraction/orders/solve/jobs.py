@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Complex, Real
+from ...atomic import make_folder
 from ...errors import DiffractionError, check_choice, one_line
 from ...progress import Progress, silent
 from ...system import environment
@@ -343,20 +344,6 @@ def _end_with_parent() -> None:
     assert parent is not None
     parent.join()
     os._exit(1)
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder of results.
-
-    Raises a DiffractionError if it cannot be written.
-    """
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise DiffractionError(
-            f"cannot write '{folder}': {error.strerror}; choose a folder that exists and is "
-            "writable"
-        ) from error
 
 
 def remove_results(folder: Path) -> None:
