@@ -34,8 +34,8 @@ class Report:
     tasks: int = 0  # that workers did
     groups: int = 0  # sums of passes that came from workers
     kept: int = 0  # sums that had been stored by an earlier run
-    # groups that were given out again, since the scheduler or a worker's files were lost; tasks of
-    # a worker that died are given to others by the scheduler
+    # groups or calls that were given out again, since the scheduler or a worker's files were lost;
+    # tasks of a worker that died are given to others by the scheduler
     retries: int = 0
     lost: int = 0  # workers that were there and are not any more
     seconds: float = 0.0  # wall time of the client
@@ -100,15 +100,16 @@ class UnderWay(Generic[Key]):
         self._calls[key] = give({}), give, files
 
     def finished(self) -> Iterator[tuple[Key, Any]]:
-        """Wait a moment, and yield the keys and the results of calls that are done.
+        """Yield the keys and the results of calls that are done; wait a moment if none is.
 
         A result is `Failed` after an error, or if workers died of a call again and again.
 
         Raises a DiffractionError if the scheduler is gone, and does not come back.
         """
         distributed = optional("distributed")
-        time.sleep(_POLL)
         done = [(key, call) for key, call in self._calls.items() if call[0][-1].done()]
+        if not done or self._silent_since:
+            time.sleep(_POLL)
         for key, (futures, give, files) in done:
             answer, contents = None, {}
             try:

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from mitsuba_diffraction import (
 from mitsuba_diffraction.cluster import calls, groups, workers
 from mitsuba_diffraction.cluster.jobs import WorkerCalls
 from mitsuba_diffraction.cluster.kept import Kept
-from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task
+from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles, run_task
 from mitsuba_diffraction.scene.passes import Span
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.build import build_with
@@ -213,6 +214,18 @@ def test_files_that_a_worker_lacks_come_by_content(
     job = film(client, scene, scene.parent / "passes")
     np.testing.assert_array_equal(picture_of(job), expected)
     assert job.report.tasks == 12
+
+
+def test_calls_get_the_files_that_a_worker_lacks(client, scene):
+    def read(argument, contents=None):
+        ((_, digest),) = argument.files.files
+        if not contents:
+            raise MissingFiles([digest])
+        return contents[digest]
+
+    calls, argument = WorkerCalls(client), SimpleNamespace(files=SceneFiles.from_scene(scene, {}))
+    assert list(calls(read, [argument, argument])) == [scene.read_bytes()] * 2
+    assert (calls.report.tasks, calls.report.retries) == (2, 2)
 
 
 def test_a_copy_of_a_scene_is_the_scene(scene, expected, monkeypatch, tmp_path):
