@@ -96,6 +96,19 @@ def check_target(target: Path) -> None:
     refuse_input(target)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those around it, where they are missing.
+
+    Raises a DiffractionError if it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot make the folder '{folder}': {error.strerror}; choose another folder"
+        ) from error
+
+
 def remove_temporaries() -> None:
     """Remove the temporary files of this process, which is about to end without unwinding."""
     for temporary in tuple(_in_use):

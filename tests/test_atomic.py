@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from mitsuba_diffraction.atomic import atomic_path, remove_temporaries
+from mitsuba_diffraction.atomic import atomic_path, make_folder, remove_temporaries
 from mitsuba_diffraction.errors import DiffractionError
 from tests.support.systems import posix
 
@@ -111,3 +111,11 @@ def test_permissions_follow_the_umask_which_no_thread_sees_changed(tmp_path, mon
     finally:
         change(before)
     assert (tmp_path / "a.txt").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path):
+    make_folder(tmp_path / "a" / "b")
+    make_folder(tmp_path / "a" / "b")  # it may be there
+    (tmp_path / "file").touch()
+    with pytest.raises(DiffractionError, match=r"^cannot make the folder '.*c': Not a directory"):
+        make_folder(tmp_path / "file" / "c")

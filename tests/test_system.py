@@ -109,3 +109,11 @@ def test_peak_of_memory_is_at_least_what_is_held_now():
 
 def test_cores_are_those_of_the_process():
     assert 1 <= system.cores() <= (os.cpu_count() or 1)
+
+
+def test_variables_of_the_environment_are_restored(monkeypatch):
+    monkeypatch.setenv("SET_BEFORE", "1")
+    with system.environment({"SET_BEFORE": "2", "NOT_SET_BEFORE": "3"}):
+        assert (os.environ["SET_BEFORE"], os.environ["NOT_SET_BEFORE"]) == ("2", "3")
+    assert os.environ["SET_BEFORE"] == "1"
+    assert "NOT_SET_BEFORE" not in os.environ

@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from PIL import Image
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
 from ..cluster.jobs import WorkerCalls
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
+from ..digests import key_of
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import readable_file
 from ..heights import Source
@@ -34,7 +34,6 @@ from ..plugin.dictionary import bsdf_dict
 from ..progress import Progress, silent
 from ..scene import set_variant
 from ..tables import DiffractionTable, TableSource
-from ..tables.store import key_of
 from .crops import crops_of
 from .iridescence import WINDOW, MaterialFactor, light_and_chance
 from .maps import brdf_map
@@ -110,9 +109,7 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
 
 def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     """Fill the row of a scan, so far as no error ends it, and return table and map."""
-    set_variant(job.variant)
-    if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
-        dr.set_thread_count(job.threads)
+    set_variant(job.variant, job.threads)
     path, _ = job.files.here()
     with warnings.catch_warnings(record=True) as overrides:
         warnings.simplefilter("always", DiffractionWarning)
@@ -258,8 +255,9 @@ def run_survey(
     files = scan_files(files)
     if not files:
         raise DiffractionError("there is no scan to survey; name files")
+    calls = None if client is None else WorkerCalls(client, variant)
     scans = folder / SCANS
-    scans.mkdir(parents=True, exist_ok=True)
+    make_folder(scans)
     shown = tuple((surface or {}).items())
     named: list[dict[str, str]] = []
     rows: dict[int, dict[str, Any]] = {}  # those that are known, by their place in `named`
@@ -286,7 +284,8 @@ def run_survey(
     todo = list(jobs)
     files_of_jobs = [Path(named[n]["file"]).name for n in todo]
     progress(0, len(todo), _next(files_of_jobs, 0, client))
-    results = WorkerCalls(client).finished(measure, [jobs[n] for n in todo])
+    given = [jobs[n] for n in todo]
+    results = enumerate(map(measure, given)) if calls is None else calls.answers(measure, given)
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):

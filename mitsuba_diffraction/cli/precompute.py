@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..cluster.jobs import build_on_workers
+from ..atomic import make_folder
+from ..cluster.jobs import WorkerCalls
 from ..errors import counted, warn
 from ..files import FileKind, kind_of
 from ..heights import HeightField
@@ -60,12 +61,12 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
     """Build one table and return its summary; the folder of a recipe's output may be made."""
     start = time.perf_counter()
     settings = source.settings_for(options.table_options(args))
-    make_folder = source.recipe is not None and args.output is None
+    is_new = source.recipe is not None and args.output is None
     if source.recipe is None:
         output = output_of(args, Path(f"{source.files[0].stem}.exr"))
     else:
         output = args.output or source.recipe.output
-        check_outputs([output], make_folder=make_folder)
+        check_outputs([output], make_folder=is_new)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = source.fields()
@@ -73,8 +74,8 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
         warn(line)
     with Bar(args) as bar:
         table, workers = _built(args, fields, settings, bar)
-        if make_folder:
-            output.parent.mkdir(parents=True, exist_ok=True)
+        if is_new:
+            make_folder(output.parent)
         table.save(output)
     print(f"{', '.join(map(str, source.files))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
@@ -94,8 +95,9 @@ def _built(
     if not on_workers(args):
         return build_with(fields, settings, bar), {}
     with client_of(args) as client:
-        table, work = build_on_workers(fields, settings, client, bar)
-        return table, work.summary()
+        calls = WorkerCalls(client)
+        table, work = build_with(fields, settings, bar, calls), calls.report
+        return table, {"tasks": work.tasks, "retries": work.retries, "busy": work.busy}
 
 
 def _report(

@@ -13,6 +13,7 @@ from typing import Any
 
 from ..analysis.observers import Eye
 from ..cluster import FrameRequest
+from ..digests import key_of, sha256_of
 from ..errors import DiffractionError, counted
 from ..extras import optional
 from ..scene import load_scene, set_variant
@@ -23,13 +24,12 @@ from ..scene.frames import (
     Frame,
     check_film,
     check_frames,
-    digest_of,
     render_frames,
     write_film,
     write_frame,
 )
 from ..scene.load import preview_samples, sensor_of
-from ..scene.parameters import values_of_frames
+from ..scene.parameters import files_of, values_of_frames
 from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
@@ -321,7 +321,7 @@ def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
                 f"-D {name}={fixed[name]} out"
             )
     every = values_of_frames(args.scene, fixed, args.frames, args.animate, args.turn)
-    content = digest_of(args.scene, fixed)
+    content = key_of(*map(sha256_of, files_of(args.scene, fixed)))
     return [
         Frame(
             folder / f"frame_{n:04d}.png",

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..atomic import make_folder
 from ..errors import DiffractionError, counted
 from ..heights import HeightField, LoadOptions
 from ..heights.read import read_heights
@@ -16,7 +17,7 @@ from . import options
 from .console import Bar, say
 from .options import number_between, whole_number
 from .report import Figures, check_outputs, output_of
-from .workers import WORKERS, executor_for
+from .workers import WORKERS, calls_for
 
 if TYPE_CHECKING:
     from ..orders import OrderTable
@@ -140,7 +141,7 @@ def run(args: argparse.Namespace) -> Figures:
         # the folder that a recipe names is made
         check_outputs([output], make_folder=args.output is None)
         if args.output is None:
-            output.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(output.parent)
         table = solve_recipe(recipe, args)
     table.save(output)
     measured, table = table.digest(), load_orders(output)
@@ -216,7 +217,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
         "in 95 % of directions"
     )
     folder = recipe.output.with_name(f".{recipe.output.stem}.solving")
-    with executor_for(args) as (executor, processes), Bar(args, " stations") as bar:
+    with calls_for(args) as (calls, processes), Bar(args, " stations") as bar:
 
         def announce(estimate: Estimate) -> None:
             size = f" for a table of {estimate.size / 1e6:.2g} MB" if estimate.size else ""
@@ -239,7 +240,7 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             **light,
             step=args.step,
             settings=recipe.settings,
-            jobs=Jobs(folder, executor, bar),
+            jobs=Jobs(folder, calls, bar),
             announce=announce,
         )
     remove_results(folder)

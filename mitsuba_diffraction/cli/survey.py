@@ -12,7 +12,6 @@ from typing import Any
 
 from ..analysis.scans import check_surface
 from ..analysis.treatments import Treatment, load_treatments
-from ..cluster.workers import check_workers
 from ..errors import DiffractionError, counted
 from ..heights.coherence import ONE_WINDOW
 from ..scene.load import set_variant
@@ -119,7 +118,6 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
         client = stack.enter_context(client_of(args)) if on_workers(args) else None
         if client is not None:
-            check_workers(client, variant)
             say_files(_read_by(args.files))
         bar = stack.enter_context(Bar(args, unit=" scans", delay=0))
         return run_survey(

@@ -20,6 +20,7 @@ from ..analysis.tradeoff import (
 )
 from ..analysis.tradeoff.accuracy import Sample
 from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
+from ..atomic import make_folder
 from ..errors import DiffractionWarning
 from ..heights import Source, gratings
 from ..heights.coherence import resolved_width
@@ -86,7 +87,7 @@ def run(args: argparse.Namespace) -> Figures:
         sample = Sample.draw(field, width, "ensemble", min(pairs, 160), bar)
         spectral = measure_wavelengths(finest, sample.wi, sample.wo)
         deep = measure_depths(depths, bar)
-    args.output.mkdir(parents=True, exist_ok=True)
+    make_folder(args.output)
     title = (
         f"{field.name}, {field.heights.shape[1]} × {field.heights.shape[0]} pixels, {width:g} µm"
     )

@@ -7,16 +7,20 @@ import contextlib
 import importlib.util
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..cluster import FrameRequest, FrameSequence, connect
-from ..cluster.workers import VARIABLE, check_workers, executor_of
+from ..cluster.jobs import WorkerCalls
+from ..cluster.workers import VARIABLE
 from ..errors import counted
 from ..system import cores
-from .console import Bar, say, say_warning
+from .console import Bar, say
 from .options import Group, refuse, whole_number
+
+if TYPE_CHECKING:
+    from ..orders.solve.jobs import Calls
 
 #: Options that choose workers.
 WORKERS = Group("workers (extra `cluster`)", (
@@ -65,7 +69,7 @@ def film_of(
     with Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         film = FrameSequence(
-            client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
+            client, args.scene, frames, variant, keep=keep, sensor=args.sensor,
             preview=args.preview, threads=worker_threads(args),
         )  # fmt: skip
     say_files(path for task in film.frames for path, _ in task.files.files)
@@ -101,19 +105,18 @@ def say_report(film: FrameSequence) -> dict[str, Any]:
 
 
 @contextlib.contextmanager
-def executor_for(args: argparse.Namespace) -> Iterator[tuple[Executor, int]]:
-    """Yield the processes that solve, and their number."""
+def calls_for(args: argparse.Namespace) -> Iterator[tuple[Calls, int]]:
+    """Yield what calls functions in the requested processes, and the number of processes."""
     if on_workers(args):
         refuse(args, ["jobs"], ": is for this machine; --workers has its own")
         with client_of(args) as client:
-            count = len(check_workers(client, None))
-            with executor_of(client) as workers:
-                yield workers, count
+            calls = WorkerCalls(client)
+            yield calls.finished, calls.workers
         return
-    from ..orders.solve.jobs import processes
+    from ..orders.solve.jobs import calls_in, processes
 
     jobs, most = args.jobs or 1, 4 * cores()
     if jobs > most:
         args.parser.error(f"argument --jobs: expected 1 to {most}, 4 for each core, got {jobs}")
     with processes(jobs) as pool:
-        yield pool, jobs
+        yield partial(calls_in, pool), jobs

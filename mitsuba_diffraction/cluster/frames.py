@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,10 +18,11 @@ from ..progress import Progress, silent
 from ..scene import load_scene, set_variant
 from ..scene.load import preview_samples, sensor_of
 from ..scene.passes import Result, Span, Stop, added, developed, integrator_of, passes_of
-from .groups import Groups, Report, Stopped, sums_in_worker
+from .calls import Report
+from .groups import Groups, Stopped, sums_in_worker
 from .kept import Kept
-from .tasks import SceneFiles, Task, film_of, versions
-from .workers import Headcount, check_workers, memory_warnings
+from .tasks import SceneFiles, Task, film_of
+from .workers import check_workers, warn_of_memory
 
 #: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
 BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
@@ -74,8 +75,8 @@ def render(
     with tempfile.TemporaryDirectory() as temporary, Stop() as stop:
         film = FrameSequence(
             client, Path(scene), [FrameRequest(dict(parameters or {}), spp, seed)], name,
-            keep=Path(keep or Path(temporary) / "passes"), warn=warn, sensor=sensor,
-            preview=preview, threads=threads,
+            keep=Path(keep or Path(temporary) / "passes"), sensor=sensor, preview=preview,
+            threads=threads,
         )  # fmt: skip
         results = list(film.render(stop, progress))
     if results:
@@ -112,7 +113,6 @@ class FrameSequence:
     variant : variant of this process, which workers set too.
     sensor, preview, threads : as in `cluster.render`.
     keep : folder of sums that wait for their picture.
-    warn : called with the text of each warning.
     """
 
     def __init__(
@@ -123,29 +123,27 @@ class FrameSequence:
         variant: str,
         *,
         keep: Path,
-        warn: Callable[[str], None],
         sensor: int = 0,
         preview: bool = False,
         threads: int = 0,
     ) -> None:
-        self._headcount = Headcount(client, check_workers(client, variant))
+        check_workers(client, variant)
         self.report = Report()
-        self._client, self._kept, self._warn = client, Kept(keep, warn), warn
+        self._client, self._kept = client, Kept(keep)
         self.scene = load_scene(scene, frames[0].values)
         self.sensor = sensor_of(self.scene, sensor, preview)
         default_samples = preview_samples(self.sensor, preview)
-        film, kind = film_of(self.scene, self.sensor), versions()
+        film = film_of(self.scene, self.sensor)
         self.frames: list[Task] = []
         for number, frame in enumerate(frames):
             files = SceneFiles.from_scene(scene, frame.values)
             passes = passes_of(self.sensor, frame.spp or default_samples, frame.seed)
             self.frames.append(
                 Task(files, variant, sensor, preview, film, number, Span(0, len(passes)),
-                     tuple(passes), kind, threads)
+                     tuple(passes), threads)
             )  # fmt: skip
         self.needed = BYTES_A_PROCESS + self._bytes_of_films()
-        for line in memory_warnings(client, self.needed):
-            warn(line)
+        warn_of_memory(client, self.needed)
 
     def _bytes_of_films(self) -> float:
         """Estimate the memory of a pass, and of the sums that a worker holds."""
@@ -165,16 +163,13 @@ class FrameSequence:
         work is stored.
         """
         start = time.perf_counter()
-        groups = Groups(
-            self._client, self._kept, self.frames, self._headcount, self.report, stop, progress
-        )
+        groups = Groups(self._client, self._kept, self.frames, self.report, stop, progress)
         try:
             for frame in self.frames:
                 total = added(frame.span, partial(groups.sum_of, frame))
                 spp = sum(each.spp for each in frame.passes)
                 picture = developed(self.scene, self.sensor, total.raw, spp)
                 self.report.where.update(total.where)
-                self.report.seconds = time.perf_counter() - start
                 yield Result(picture, spp, stop.asked)
                 self._kept.forget(frame)
                 if stop.asked:
@@ -182,11 +177,11 @@ class FrameSequence:
         except Stopped:
             return
         finally:
-            groups.cancel()
-            self.report.lost = self._headcount.lost()
+            groups.under_way.cancel()
+            self.report.lost = groups.under_way.lost()
             self.report.seconds = time.perf_counter() - start
             if len(self.report.where) > 1:
-                self._warn(
+                warn(
                     "sums of different processors or numbers of threads were mixed, and may "
                     f"differ in their last bits: {'; '.join(sorted(self.report.where))}"
                 )

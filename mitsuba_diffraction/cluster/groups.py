@@ -6,18 +6,16 @@ tasks, which are smaller parts, and add up their sums. How passes are grouped ch
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from ..errors import DiffractionError, counted
 from ..progress import Progress
 from ..scene.passes import Span, Stop
+from .calls import Contents, Report, UnderWay, submitted
 from .kept import Kept
 from .tasks import Failed, Sums, Task, add_sums, run_task
-from .workers import Headcount, outcome, wait_for_scheduler
 
 #: Groups of a job, at most, unless it has more frames: a client that is killed loses 1/64 of the
 #: work, and 64 sums are little to receive.
@@ -28,57 +26,10 @@ TASKS_A_WORKER = 10
 AHEAD = 8
 #: Sums that a worker adds at once.
 ADDED = 4
-_POLL = 0.05  # seconds
-
-
-@dataclass
-class Report:
-    """Cost of a run on workers."""
-
-    tasks: int = 0  # that workers did
-    groups: int = 0  # sums of passes that came from workers
-    kept: int = 0  # sums that had been stored by an earlier run
-    # groups that were given out again, since the scheduler or a worker's files were lost; tasks of
-    # a worker that died are given to others by the scheduler
-    retries: int = 0
-    lost: int = 0  # workers that were there and are not any more
-    seconds: float = 0.0  # wall time of the client
-    busy: float = 0.0  # seconds of all workers' work
-    bytes: int = 0  # size of the sums that came from workers
-    peak: int = 0  # bytes of memory that a worker has taken at most
-    # workers, where: addresses, and processors with threads, of what has been added up
-    workers: set[str] = field(default_factory=set)
-    where: set[str] = field(default_factory=set)
-
-    def summary(self) -> dict[str, Any]:
-        """Return plain data, with the time that a task costs besides its work."""
-        plain = {k: sorted(v) if isinstance(v, set) else v for k, v in vars(self).items()}
-        count = len(self.workers) or 1
-        idle = self.seconds * count - self.busy
-        return plain | {"overhead_per_task_s": idle / self.tasks if self.tasks else 0.0}
-
-    def add(self, sums: Sums) -> None:
-        """Count a sum that came from workers."""
-        self.groups += 1
-        self.tasks += sums.tasks
-        self.busy += sums.seconds
-        self.bytes += sums.raw.nbytes
-        self.peak = max(self.peak, sums.peak)
-        self.workers.update(sums.workers)
 
 
 class Stopped(Exception):
     """The command was asked to stop."""
-
-
-@dataclass
-class _Group:
-    """A group with workers: futures of its tasks and of its sum."""
-
-    passes: Task
-    task_size: int
-    tasks: dict[Span, Any] = field(default_factory=dict)
-    sum: Any = None
 
 
 def group_size(passes: int, frames: int) -> int:
@@ -112,34 +63,29 @@ class Groups:
     client : `distributed.Client`.
     kept : sums on disk.
     frames : in the order in which their sums are waited for.
-    headcount : of the workers.
     report : is added to.
     stop : asked, it ends the wait.
     progress : called as progress(passes done, passes in all, text).
     """
 
     def __init__(
-        self, client: Any, kept: Kept, frames: Sequence[Task], headcount: Headcount,
-        report: Report, stop: Stop, progress: Progress,
+        self, client: Any, kept: Kept, frames: Sequence[Task], report: Report, stop: Stop,
+        progress: Progress,
     ) -> None:  # fmt: skip
         self._client, self._kept, self._frames = client, kept, frames
-        self._headcount, self._report, self._stop = headcount, report, stop
-        self._progress = progress
-        self._contents: dict[str, Any] = {}
-        self._under_way: list[_Group] = []
-        # of each frame: the groups that it is added from, and those that are on disk
-        self._spans: list[set[Span]] = []
-        self._stored = [kept.spans(frame) for frame in frames]
-        self._waiting: list[Task] = []
+        self._report, self._stop, self._progress = report, stop, progress
+        self.under_way = UnderWay[Task](client, report)
         self._total = sum(frame.span.count for frame in frames)
         size = group_size(self._total, len(frames))
-        for frame, stored in zip(frames, self._stored, strict=True):
+        # whether a group is on disk, by the number of its frame and its passes
+        self._stored: dict[tuple[int, Span], bool] = {}
+        self._waiting: list[Task] = []
+        for frame in reversed(frames):
+            stored = kept.spans(frame)
             spans = list(_cut(frame.span, size, stored))
-            self._spans.append(set(spans))
-            self._waiting += [frame.part(span) for span in spans if span not in stored]
-            report.kept += len(stored)
-        self._waiting.reverse()
-        self._left = sum(task.span.count for task in self._waiting)
+            self._stored |= {(frame.frame, span): span in stored for span in spans}
+            self._waiting += [frame.part(span) for span in reversed(spans) if span not in stored]
+        report.kept = sum(self._stored.values())
 
     def sum_of(self, frame: Task, span: Span) -> Sums | None:
         """Wait for the sum of a group; None for single passes.
@@ -152,91 +98,63 @@ class Groups:
             Naming frame, passes and worker, if a task fails.
         """
         number = frame.frame
-        if span not in self._spans[number]:
+        if (number, span) not in self._stored:
             return None
         while True:
-            if span in self._stored[number]:
+            if self._stored[number, span]:
                 sums = self._kept.read(frame, span)
                 if sums is not None:
                     return sums
-                self._stored[number].remove(span)
+                self._stored[number, span] = False
                 self._report.kept -= 1
-                self._left += span.count
                 self._waiting.append(frame.part(span))
             if self._stop.asked:
                 raise Stopped
             self._give_out()
             self._take()
             what = f"frame {number + 1} of {len(self._frames)}, " if len(self._frames) > 1 else ""
-            text = f"{what}{counted(self._headcount.now(), 'worker')}"
-            self._progress(self._total - self._left, self._total, text)
-            time.sleep(_POLL)
-
-    def cancel(self) -> None:
-        """Cancel tasks whose results nobody waits for."""
-        for group in self._under_way:
-            self._client.cancel([*group.tasks.values(), group.sum])
-        self._under_way.clear()
+            text = f"{what}{counted(self.under_way.workers(), 'worker')}"
+            done = sum(span.count for (_, span), stored in self._stored.items() if stored)
+            self._progress(done, self._total, text)
 
     def _give_out(self) -> None:
-        workers = max(1, self._headcount.now())
+        workers = max(1, self.under_way.workers())
         size = task_size(self._total, len(self._frames), workers)
-        tasks = sum(len(group.tasks) for group in self._under_way)
-        while self._waiting and tasks < AHEAD * workers:
-            group = _Group(self._waiting.pop(), size)
-            self._submit(group)
-            self._under_way.append(group)
-            tasks += len(group.tasks)
+        while self._waiting and len(self.under_way) < AHEAD * workers:
+            group = self._waiting.pop()
+            self.under_way.give_out(group, partial(self._submitted, group, size, {}), group.files)
 
-    def _submit(self, group: _Group, lacking: Sequence[str] = ()) -> None:
-        """Submit the additions, and the tasks that no worker has or has done.
+    def _submitted(
+        self, group: Task, size: int, tasks: dict[Span, Any], contents: Contents
+    ) -> list[Any]:
+        """Submit the additions of a group, and the tasks that no worker has or has done.
 
-        The futures of tasks are held until the sum is here: where a worker dies, only what it had
-        rendered is rendered again.
+        tasks : futures of tasks, held until the sum is here: where a worker dies, only what it had
+            rendered is rendered again.
         """
-        client, task, size = self._client, group.passes, group.task_size
-        contents = {digest: self._content(task, digest) for digest in lacking}
 
         def sum_of(span: Span) -> Any:
             if span.count > size:
                 parts = [sum_of(part) for part in terms_of(span, size)]
                 # before other tasks: it takes sums out of the workers' memory
-                return client.submit(add_sums, parts, pure=False, priority=1)
-            future = group.tasks.get(span)
+                return submitted(self._client, add_sums, parts, priority=1)
+            future = tasks.get(span)
             if future is None or future.status not in ("pending", "finished"):
-                future = group.tasks[span] = client.submit(
-                    run_task, task.part(span), contents, pure=False, priority=-task.frame
+                future = tasks[span] = submitted(
+                    self._client, run_task, group.part(span), contents, priority=-group.frame
                 )
             return future
 
-        group.sum = sum_of(task.span)
-
-    def _content(self, task: Task, digest: str) -> Any:
-        """Return the content of a file as a task, which Dask repeats where its result is lost."""
-        if digest not in self._contents:
-            path = next(path for path, other in task.files.files if other == digest)
-            self._contents[digest] = self._client.submit(
-                bytes, Path(path).read_bytes(), key=f"file-{digest[:32]}"
-            )
-        return self._contents[digest]
+        total = sum_of(group.span)
+        return [*(future for future in tasks.values() if future is not total), total]
 
     def _take(self) -> None:
-        for group in [group for group in self._under_way if group.sum.done()]:
-            answer, task = outcome(group.sum), group.passes
-            if isinstance(answer, Sums):
-                self._kept.write(self._frames[task.frame], task.span, answer)
-                self._stored[task.frame].add(task.span)
-                self._left -= task.span.count
-                self._under_way.remove(group)
-                self._report.add(answer)
-            elif isinstance(answer, Failed):
-                raise DiffractionError(f"{task}, {answer}")
-            else:
-                if answer is None:
-                    self._contents.clear()
-                    wait_for_scheduler(self._client, self._stop)
-                self._report.retries += 1
-                self._submit(group, answer.digests if answer else ())
+        for group, answer in self.under_way.finished():
+            if isinstance(answer, Failed):
+                raise DiffractionError(f"{group}, {answer}")
+            self._kept.write(self._frames[group.frame], group.span, answer)
+            self._stored[group.frame, group.span] = True
+            self._report.add(answer)
 
 
 def _cut(span: Span, size: int, stored: set[Span]) -> Iterator[Span]:

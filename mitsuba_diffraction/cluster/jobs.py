@@ -1,25 +1,23 @@
-"""Independent jobs, here or on workers: scans as they finish, windows in order."""
+"""Independent jobs on workers: scans and gratings as they finish, windows in order."""
 
 from __future__ import annotations
 
 import itertools
 import time
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from ..errors import DiffractionError
 from ..heights import HeightField
-from ..heights.coherence import resolved
 from ..progress import Progress
 from ..settings import TableSettings
 from ..tables import DiffractionTable
 from ..tables.build.build import build_with
-from .tasks import Failed, MissingFiles, check_versions, failures, versions
-from .workers import check_workers, outcome, wait_for_scheduler, workers_of
+from .calls import Contents, Report, UnderWay, submitted
+from .tasks import Failed
+from .workers import check_workers
 
-_POLL = 0.005  # seconds
 #: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
 _AHEAD = 2
 
@@ -47,48 +45,28 @@ def build(
     progress : called as progress(done, total, text).
     settings : of `DiffractionTable.build`.
     """
-    return build_on_workers(heights, TableSettings(**settings), client, progress)[0]
-
-
-def build_on_workers(
-    heights: HeightField | Sequence[HeightField],
-    settings: TableSettings,
-    client: Any,
-    progress: Progress | None = None,
-) -> tuple[DiffractionTable, WorkerCalls]:
-    """Build as `build`, and return the table with the jobs that know their cost."""
-    scans = [heights] if isinstance(heights, HeightField) else list(heights)
-    if resolved(settings, scans).taper_width is None:
-        raise DiffractionError(
-            "workers build tables of windows: give a scan (periodic=open), or windows=W, or do "
-            "without workers"
-        )
-    check_workers(client, None)
-    run = WorkerCalls(client)
-    return build_with(heights, settings, progress, run), run
+    return build_with(heights, TableSettings(**settings), progress, WorkerCalls(client))
 
 
 class WorkerCalls:
-    """Independent calls on workers, or here: as they finish, or in order.
+    """Independent calls on workers: as they finish, or in order.
+
+    Raises a DiffractionError if a worker is of no use.
 
     Parameters
     ----------
-    client : `distributed.Client`, or None to do all here.
+    client : `distributed.Client`.
+    variant : of Mitsuba that workers have to work in; None where that does not matter.
 
     Attributes
     ----------
-    tasks, retries : that were done, and given out again when the scheduler was lost.
-    busy : seconds of all workers' work.
+    workers : number at the start.
+    report : its tasks, retries, and seconds of work.
     """
 
-    def __init__(self, client: Any) -> None:
-        self._client = client
-        self.tasks = self.retries = 0
-        self.busy = 0.0
-
-    def summary(self) -> dict[str, Any]:
-        """Return the cost as plain data."""
-        return {name: getattr(self, name) for name in ("tasks", "retries", "busy")}
+    def __init__(self, client: Any, variant: str | None = None) -> None:
+        self._client, self.workers = client, len(check_workers(client, variant))
+        self.report = Report()
 
     def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
         """Yield results in the order of the arguments, a few of which are at work at once.
@@ -97,15 +75,22 @@ class WorkerCalls:
         """
         wanted, early = 0, dict[int, Any]()
         for n, result in self.finished(work, arguments, early):
-            if isinstance(result, Failed):
-                raise DiffractionError(str(result))
             early[n] = result
             while wanted in early:
                 yield early.pop(wanted)
                 wanted += 1
 
     def finished(
-        self, work: Callable[..., Any], arguments: Iterable[Any], early: Sized | None = None
+        self, work: Callable[[Any], Any], arguments: Iterable[Any], early: Sized = ()
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield results as `answers` does, and raise a DiffractionError if a call fails, too."""
+        for n, result in self.answers(work, arguments, early):
+            if isinstance(result, Failed):
+                raise DiffractionError(str(result))
+            yield n, result
+
+    def answers(
+        self, work: Callable[..., Any], arguments: Iterable[Any], early: Sized = ()
     ) -> Iterator[tuple[int, Any]]:
         """Yield the number and the result of each call as it finishes.
 
@@ -116,59 +101,39 @@ class WorkerCalls:
         work : called with an argument; with the argument and contents of files, once it has raised
             `MissingFiles`.
         arguments : have `files`, `SceneFiles`, if the work needs files.
-        early : results that wait for others; None gives out all calls at once.
+        early : results that wait for others.
 
         Returns
         -------
         Numbers and results; `Failed` for an error, or a worker that died of a call again and again.
         """
         left = enumerate(arguments)
-        if self._client is None:
-            yield from ((n, work(argument)) for n, argument in left)
-            return
-        waiting: dict[Any, tuple[int, Any]] = {}
+        calls = UnderWay[int](self._client, self.report)
         try:
             while True:
-                room = None
-                if early is not None:
-                    room = _AHEAD * max(1, len(workers_of(self._client)))
-                    room = max(0, room - len(waiting) - len(early))
-                for n, argument in itertools.islice(left, room):
-                    waiting[self._submitted(work, argument)] = n, argument
-                if not waiting:
+                room = _AHEAD * max(1, calls.workers()) - len(calls) - len(early)
+                for n, argument in itertools.islice(left, max(0, room)):
+                    give = partial(self._submitted, work, argument)
+                    calls.give_out(n, give, getattr(argument, "files", None))
+                if not calls:
                     return
-                while not (done := [future for future in waiting if future.done()]):
-                    time.sleep(_POLL)
-                for future in done:
-                    (n, argument), answer = waiting.pop(future), outcome(future)
+                for n, answer in calls.finished():
                     if isinstance(answer, Failed):
                         yield n, answer
-                    elif isinstance(answer, MissingFiles):
-                        files, wanted = argument.files.files, set(answer.digests)
-                        contents = {d: Path(path).read_bytes() for path, d in files if d in wanted}
-                        waiting[self._submitted(work, argument, contents)] = n, argument
-                    elif answer is None:
-                        wait_for_scheduler(self._client)
-                        self.retries += 1
-                        waiting[self._submitted(work, argument)] = n, argument
-                    else:
-                        result, seconds = answer
-                        self.tasks += 1
-                        self.busy += seconds
-                        yield n, result
+                        continue
+                    result, seconds = answer
+                    self.report.tasks += 1
+                    self.report.busy += seconds
+                    yield n, result
         finally:
-            for future in waiting:
-                future.cancel()
+            calls.cancel()
 
-    def _submitted(self, *call: Any) -> Any:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Sending large graph")  # it is sent once
-            return self._client.submit(_done, versions(), *call, pure=False)
+    def _submitted(self, work: Callable[..., Any], argument: Any, contents: Contents) -> list[Any]:
+        given = (argument, contents) if contents else (argument,)
+        return [submitted(self._client, _timed, work, *given)]
 
 
-def _done(wanted: tuple[str, ...], work: Callable[..., Any], *given: Any) -> tuple[Any, float]:
+def _timed(work: Callable[..., Any], *given: Any) -> tuple[Any, float]:
     """Return the result of a call, and its seconds."""
     start = time.perf_counter()
-    with failures():
-        check_versions(wanted)  # a late worker has not been checked
-        return work(*given), time.perf_counter() - start
+    return work(*given), time.perf_counter() - start

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import one_line, warn
+from ..atomic import make_folder
 from ..scene.passes import Span
-from ..tables.store import Record, read_record, write_record
+from ..tables.store import Record, found, write_record
 from .tasks import Sums, Task
 
 
+@dataclass(frozen=True)
 class Kept:
     """Folder of sums on disk, created when the first comes and removed when it is empty.
 
     Parameters
     ----------
     folder : where the files lie, one for each sum of a frame's passes.
-    warn : called with a line for each damaged file.
     """
 
-    def __init__(self, folder: Path, warn: Callable[[str], None] = warn) -> None:
-        self.folder, self._warn = folder, warn
+    folder: Path
 
     def spans(self, frame: Task) -> set[Span]:
         """Return the passes of a frame whose sums are stored."""
@@ -31,22 +30,17 @@ class Kept:
 
     def write(self, frame: Task, span: Span, sums: Sums) -> None:
         """Write the sum of passes of a frame whole."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         about = {name: value for name, value in vars(sums).items() if name != "raw"}
         write_record(self._file(frame, span), _title(frame, span), Record(about, [sums.raw]))
 
     def read(self, frame: Task, span: Span) -> Sums | None:
         """Read a sum; None if it is missing, or damaged, which is removed."""
-        file = self._file(frame, span)
-        try:
-            record = read_record(file, _title(frame, span))
+
+        def sums_in(record: Record) -> Sums:
             return Sums(raw=record.arrays[0], **record.document)
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
-            self._warn(f"'{file}' is damaged ({one_line(str(error))[:100]}) and rendered again")
-            file.unlink(missing_ok=True)
-            return None
+
+        return found(self._file(frame, span), _title(frame, span), sums_in)
 
     def forget(self, frame: Task) -> None:
         """Remove the sums of a frame whose picture is written."""

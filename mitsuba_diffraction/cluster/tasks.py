@@ -6,31 +6,29 @@ Scene files are identified by content: used in place, or copied to workers that 
 from __future__ import annotations
 
 import atexit
-import contextlib
-import hashlib
 import os
 import shutil
 import tempfile
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
+from ..digests import key_of, sha256_of
 from ..errors import DiffractionError, counted, one_line
 from ..scene.load import load_scene, sensor_of, set_variant
 from ..scene.parameters import files_of
 from ..scene.passes import Pass, Span, added, integrator_of, render_pass
 from ..system import cores, peak_memory, processor
-from ..tables.store import cache_folder, key_of
+from ..tables.store import cache_folder
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
 
@@ -48,7 +46,6 @@ class Task:
     frame: int  # number of the frame
     span: Span  # numbers of the passes
     passes: tuple[Pass, ...]  # seeds and samples of the span
-    versions: tuple[str, ...]  # packages that decide the bits of a picture
     threads: int  # threads of Dr.Jit; 0 for one a core
 
     def part(self, span: Span) -> Task:
@@ -61,7 +58,7 @@ class Task:
         """Key of the sum: all that decides it, except the threads and processor that add it up."""
         passes = [(render.seed, render.spp) for render in self.passes]
         what = (self.files.digest, self.variant, self.sensor, self.preview, self.film, passes)
-        return key_of("sum of passes", *what, self.versions)
+        return key_of("sum of passes", *what, versions())
 
     def __str__(self) -> str:
         return f"frame {self.frame}, {self.span}"
@@ -121,35 +118,58 @@ def versions() -> tuple[str, ...]:
 def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums:
     """Render and add up passes in this process.
 
-    contents : content of files that are missing here, by digest.
-
-    Raises
-    ------
-    MissingFiles
-        If more are missing.
-    Failed
-        After any other error.
+    contents : content of files that are missing here, by digest; raises `MissingFiles` if more are.
     """
-    with failures():
-        task.files.require(contents or {})
-        # the client has loaded the scene, and said them
-        with warnings.catch_warnings(action="ignore"):
-            return _sums(task)
+    start = time.perf_counter()
+    task.files.require(contents or {})
+    threads = task.threads or cores()
+    set_variant(task.variant, threads)  # per process and thread: mitsuba3 #1685
+
+    def sum_of(span: Span) -> Any:
+        if span.count > 1:
+            return None
+        return render_pass(scene, sensor, task.passes[span.first - task.span.first])
+
+    # the client has loaded the scene, and said them
+    with warnings.catch_warnings(action="ignore"):
+        scene, sensor = loaded_scene(task.files, task.variant, task.sensor, task.preview)
+        if film_of(scene, sensor) != task.film:
+            raise DiffractionError(
+                "its film is not that of frame 0; parameters that change the film's size or "
+                "format take one process, or a run for each"
+            )
+        total = added(task.span, sum_of)
+    peak = peak_memory()
+    where = f"{processor()}, {counted(threads, 'thread')}"
+    return Sums(total, (where,), (worker_address(),), 1, time.perf_counter() - start, peak)
 
 
 def add_sums(sums: Sequence[Sums]) -> Sums:
     """Add sums of spans that follow one another and are of one size, except the last."""
-    with failures():
-        return added(
-            Span(0, len(sums)), lambda span: sums[span.first] if span.count == 1 else None
-        )  # fmt: skip
+    whole = Span(0, len(sums))
+    return added(whole, lambda span: sums[span.first] if span.count == 1 else None)
 
 
-@contextlib.contextmanager
-def failures() -> Iterator[None]:
-    """Raise errors of a worker as `Failed`, in one line."""
+def called(wanted: tuple[str, ...], work: Callable[..., Any], *given: Any) -> Any:
+    """Call a function on a worker, late ones included, which nobody has checked.
+
+    wanted : `versions` of the client.
+
+    Raises
+    ------
+    MissingFiles
+        If the call does.
+    Failed
+        After any other error, in one line.
+    """
     try:
-        yield
+        for name, here, there in zip(_PACKAGES, versions(), wanted, strict=True):
+            if here != there:
+                raise DiffractionError(
+                    f"it has {name} {here}, and the client {there}: pictures of both need not "
+                    "agree; install the same version on both"
+                )
+        return work(*given)
     except MissingFiles:
         raise
     except DiffractionError as error:
@@ -157,31 +177,6 @@ def failures() -> Iterator[None]:
     except Exception as error:
         text = f"unexpected {type(error).__name__}: {one_line(str(error))}"
         raise Failed(text, worker_address()) from None
-
-
-def _sums(task: Task) -> Sums:
-    start = time.perf_counter()
-    check_versions(task.versions)
-    threads = task.threads or cores()
-    set_variant(task.variant)  # per process and thread: mitsuba3 #1685
-    if task.variant.startswith("llvm") and dr.thread_count() != threads:
-        dr.set_thread_count(threads)
-    scene, sensor = loaded_scene(task.files, task.variant, task.sensor, task.preview)
-    if film_of(scene, sensor) != task.film:
-        raise DiffractionError(
-            "its film is not that of frame 0; parameters that change the film's size or format "
-            "take one process, or a run for each"
-        )
-
-    def sum_of(span: Span) -> Any:
-        if span.count > 1:
-            return None
-        return render_pass(scene, sensor, task.passes[span.first - task.span.first])
-
-    total = added(task.span, sum_of)
-    peak = peak_memory()
-    where = f"{processor()}, {counted(threads, 'thread')}"
-    return Sums(total, (where,), (worker_address(),), 1, time.perf_counter() - start, peak)
 
 
 @lru_cache(1)
@@ -197,17 +192,6 @@ def film_of(scene: Any, sensor: Any) -> str:
     film = sensor.film()
     offset, size = film.crop_offset(), film.crop_size()
     return f"{film} {offset} {size} {integrator_of(scene).aov_names()}"
-
-
-def check_versions(wanted: tuple[str, ...]) -> None:
-    """Refuse to work with other package versions than the client's."""
-    installed = versions()
-    for name, here, there in zip(_PACKAGES, installed, wanted, strict=True):
-        if here != there:
-            raise DiffractionError(
-                f"it has {name} {here}, and the client {there}: pictures of both need not agree; "
-                "install the same version on both"
-            )
 
 
 def worker_address() -> str:
@@ -233,7 +217,7 @@ class SceneFiles:
         """Read the digests of the files of an XML scene."""
         absolute = Path(os.path.abspath(scene))
         paths = {os.path.abspath(path) for path in files_of(absolute, values)}
-        files = tuple((path, _digest(path, *_stamp(path))) for path in sorted(paths))
+        files = tuple((path, _digest(path)) for path in sorted(paths))
         return cls(str(absolute), tuple(sorted(values.items())), files)
 
     @property
@@ -243,47 +227,45 @@ class SceneFiles:
         contents = [(os.path.relpath(path, root), digest) for path, digest in self.files]
         return key_of(os.path.basename(self.scene), self.values, contents)
 
-    def missing(self) -> list[str]:
-        """List digests of the files that this machine has neither in place nor copied."""
-        return sorted({digest for path, digest in self.files if not self._found(path, digest)})
-
-    def keep(self, contents: Mapping[str, bytes]) -> None:
-        """Write copies of missing files. contents: by digest."""
-        for path, digest in self.files:
-            if digest in contents and not self._found(path, digest):
-                copy = self._copy(path)
-                copy.parent.mkdir(parents=True, exist_ok=True)
-                with atomic_path(copy) as temporary:
-                    temporary.write_bytes(contents[digest])
-
     def require(self, contents: Mapping[str, bytes]) -> None:
         """Write copies of missing files, and check that none is missing. contents: by digest.
 
         Raises `MissingFiles`, or a DiffractionError if a content has another digest.
         """
-        self.keep(contents)
-        lacking = self.missing()
-        if {*lacking} & {*contents}:
-            raise DiffractionError("its files changed since the command began; run it again")
-        if lacking:
-            raise MissingFiles(lacking)
+        missing = [
+            (self._copy(path), digest)
+            for path, digest in self.files
+            if not (_has(path, digest) or _has(self._copy(path), digest))
+        ]
+        for copy, digest in missing:
+            if digest in contents:
+                _write(copy, contents[digest])
+                if not _has(copy, digest):
+                    raise DiffractionError(
+                        "its files changed since the command began; run it again"
+                    )
+        if lacking := {digest for _, digest in missing} - {*contents}:
+            raise MissingFiles(sorted(lacking))
 
     def here(self) -> tuple[Path, dict[str, str]]:
         """Return the scene and its values on this machine: in place, or copies of all."""
         if all(_has(path, digest) for path, digest in self.files):
             return Path(self.scene), dict(self.values)
         for path, digest in self.files:  # paths are relative to the scene: copies lie together
-            if not _has(str(self._copy(path)), digest):
-                self.keep({digest: Path(path).read_bytes()})
+            if not _has(self._copy(path), digest):
+                _write(self._copy(path), Path(path).read_bytes())
         absolute = {path: str(self._copy(path)) for path, _ in self.files}
         return self._copy(self.scene), {k: absolute.get(v, v) for k, v in self.values}
-
-    def _found(self, path: str, digest: str) -> bool:
-        return _has(path, digest) or _has(str(self._copy(path)), digest)
 
     def _copy(self, path: str) -> Path:
         folder = cache_folder() or _own_temporary()
         return folder / "scenes" / self.digest[:32] / Path(path).relative_to(Path(path).anchor)
+
+
+def _write(copy: Path, content: bytes) -> None:
+    make_folder(copy.parent)
+    with atomic_path(copy) as temporary:
+        temporary.write_bytes(content)
 
 
 @lru_cache(1)
@@ -297,20 +279,19 @@ def _own_temporary() -> Path:
     return Path(folder)
 
 
-def _has(path: str, digest: str) -> bool:
+def _has(path: str | Path, digest: str) -> bool:
     try:
-        return _digest(path, *_stamp(path)) == digest
+        return _digest(path) == digest
     except OSError:
         return False
 
 
-def _stamp(path: str) -> tuple[int, int]:
+def _digest(path: str | Path) -> str:
+    """Return the SHA-256 of a file, read again only when its time or size has changed."""
     status = os.stat(path)
-    return status.st_mtime_ns, status.st_size
+    return _digest_at(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(4096)
-def _digest(path: str, *stamp: int) -> str:
-    """Return the SHA-256 of a file, read again only when its time or size has changed."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _digest_at(path: str | Path, *stamp: int) -> str:
+    return sha256_of(path)

@@ -7,30 +7,23 @@ import logging
 import os
 import signal
 import threading
-import time
-from collections.abc import Iterable, Iterator
-from concurrent.futures import CancelledError, Executor
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from typing import Any
 
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError, one_line, warn
 from ..extras import optional
 from ..scene import set_variant
-from ..scene.passes import Stop
-from .tasks import Failed, MissingFiles, check_versions, versions
+from ..system import environment
+from .tasks import called, versions
 
 #: Names a running cluster, as Dask has it.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
 #: Seconds for the first worker to come, and for a scheduler that was lost.
 PATIENCE = 60.0
-#: Seconds between counts of the workers.
-COUNT_EVERY = 2.0
-_DIED = (
-    "died, as did those before that had the same task; a worker may lack memory, see "
-    "docs/cluster.md"
-)
-GONE = (
-    "the scheduler is gone; start it and its workers, and run the same command again, which goes "
-    "on from the stored results"
+# Text that a worker runs, twice, as it starts; one that leads its session is not in the way
+_LEAVE = (
+    "import contextlib, os\nwith contextlib.suppress(OSError, AttributeError):\n    os.setsid()"
 )
 
 
@@ -63,16 +56,20 @@ def connect(
             "distributed.deploy.lost-worker-timeout": "10 minutes",
             # it looks at a worker's stack a hundred times a second, which costs 6 % of its time
             "distributed.worker.profile.enabled": False,
+            # Mitsuba answers Ctrl-C itself while it renders, and a scalar variant leaves its pass
+            # unfinished: workers leave the terminal's reach, late ones too
+            "distributed.worker.preload": [_LEAVE],
         }
         with dask.config.set(settings):
+            # Python's tracker of semaphores, which starts inside, is silent at an abrupt end
+            silent = f"{os.environ.get('PYTHONWARNINGS', '')},ignore:resource_tracker:UserWarning"
             # the processes that are started ignore Ctrl-C: it is for the client
-            with _ctrl_c_ignored(), _silent_tracker():
+            with _ctrl_c_ignored(), environment({"PYTHONWARNINGS": silent}):
                 cluster = distributed.LocalCluster(
                     n_workers=count, threads_per_worker=1, processes=True, host="127.0.0.1",
                     dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
                 )  # fmt: skip
             with cluster, distributed.Client(cluster) as client:
-                client.register_plugin(_apart(distributed))
                 yield client
         return
     address = scheduler or os.environ.get(VARIABLE)
@@ -106,10 +103,9 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
     client : `distributed.Client`.
     variant : of Mitsuba that they have to work in; None where that does not matter.
     """
-    distributed = optional("distributed")
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
-    except (TimeoutError, distributed.TimeoutError) as error:
+    except TimeoutError as error:
         raise DiffractionError(
             f"no worker came within {PATIENCE:.0f} s; start some with 'dask worker --nthreads 1'"
         ) from error
@@ -119,12 +115,14 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
                 f"worker {address} has {about['nthreads']} Dask threads, of which Dr.Jit takes one "
                 "at a time: start it with 'dask worker --nthreads 1'"
             )
-    reasons = client.run(trouble_of_process, versions(), variant, on_error="return")
-    answers = {a: trouble for a, trouble in reasons.items() if not isinstance(trouble, OSError)}
-    for address, trouble in answers.items():  # the others have just gone
-        if trouble is not None:
-            raise DiffractionError(f"worker {address} is of no use: {one_line(str(trouble))}")
-    return list(answers)
+    asked = (str,) if variant is None else (set_variant, variant)
+    answers = client.run(called, versions(), *asked, on_error="return")
+    for address, answer in answers.items():
+        if isinstance(answer, Exception) and not isinstance(answer, OSError):
+            reason = one_line(str(getattr(answer, "text", answer)))
+            raise DiffractionError(f"worker {address} is of no use: {reason}")
+    # the others have just gone
+    return [address for address, answer in answers.items() if not isinstance(answer, OSError)]
 
 
 def workers_of(client: Any) -> dict[str, Any]:
@@ -137,119 +135,15 @@ def workers_of(client: Any) -> dict[str, Any]:
         return {}
 
 
-@contextlib.contextmanager
-def executor_of(client: Any) -> Iterator[Executor]:
-    """Yield the client's workers as an executor, whose tasks another worker repeats if one dies.
-
-    Raises a DiffractionError if several workers die of the same task, or the scheduler is gone.
-    """
-    distributed = optional("distributed")
-    try:
-        yield client.get_executor()
-    except distributed.scheduler.KilledWorker as error:
-        raise DiffractionError(f"worker {error.last_worker.address} {_DIED}") from error
-    except (CancelledError, distributed.client.FutureCancelledError, OSError) as error:
-        raise DiffractionError(GONE) from error
-
-
-class Headcount:
-    """Number of workers, counted every `COUNT_EVERY` seconds.
-
-    Parameters
-    ----------
-    client : `distributed.Client`.
-    there : addresses of the workers at the start.
-    """
-
-    def __init__(self, client: Any, there: Iterable[str]) -> None:
-        self._client, self._seen, self._there = client, set(there), set(there)
-        self._time = time.monotonic()
-
-    def now(self) -> int:
-        """Return the number of workers."""
-        if time.monotonic() - self._time > COUNT_EVERY:
-            self.lost()
-        return len(self._there)
-
-    def lost(self) -> int:
-        """Count now, and return how many workers were there and are not any more."""
-        self._time, self._there = time.monotonic(), set(workers_of(self._client))
-        self._seen |= self._there
-        return len(self._seen - self._there)
-
-
-def outcome(future: Any) -> Any:
-    """Return the result of a task, or its error: `MissingFiles`, or `Failed`, also if its workers
-    died. None if the scheduler lost it."""
-    distributed = optional("distributed")
-    try:
-        return future.result()
-    except (Failed, MissingFiles) as error:
-        return error
-    except distributed.scheduler.KilledWorker as error:
-        return Failed(f"it {_DIED}", error.last_worker.address)
-    except (CancelledError, distributed.client.FutureCancelledError, OSError):
-        return None
-
-
-def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
-    """Wait until the scheduler answers again, or `stop` is asked."""
-    end = time.monotonic() + PATIENCE
-    while client.status != "running" and not (stop and stop.asked):
-        if client.status == "closed" or time.monotonic() > end:
-            raise DiffractionError(GONE)
-        time.sleep(0.1)
-
-
-def memory_warnings(client: Any, needed: float) -> Iterator[str]:
-    """Yield lines on workers whose memory limit is below the estimated need of a task, in bytes."""
+def warn_of_memory(client: Any, needed: float) -> None:
+    """Warn of workers whose memory limit is below the estimated need of a task, in bytes."""
     for address, about in workers_of(client).items():
         limit = about.get("memory_limit") or 0
         if 0 < limit < needed:
-            yield (
+            warn(
                 f"worker {address} may use {limit / 1e9:.2g} GB, and a task is estimated to need "
                 f"{needed / 1e9:.2g} GB; start fewer workers, or smaller pictures"
             )
-
-
-def trouble_of_process(wanted: tuple[str, ...], variant: str | None) -> str | None:
-    """Return the reason why this process cannot serve, or None."""
-    try:
-        check_versions(wanted)
-        if variant is not None:
-            set_variant(variant)
-    except DiffractionError as error:
-        return str(error)
-    return None
-
-
-def _apart(distributed: Any) -> Any:
-    """Return a plugin that takes workers out of the terminal's reach, late ones too.
-
-    Mitsuba answers Ctrl-C itself while it renders, and a scalar variant leaves its pass unfinished.
-    """
-
-    class Apart(distributed.WorkerPlugin):
-        def setup(self, worker: Any) -> None:
-            with contextlib.suppress(OSError, AttributeError):  # leads one already; Windows
-                os.setsid()
-
-    return Apart()
-
-
-@contextlib.contextmanager
-def _silent_tracker() -> Iterator[None]:
-    """Silence Python's tracker of semaphores, which starts inside, at a client's abrupt end."""
-    name, before = "PYTHONWARNINGS", os.environ.get("PYTHONWARNINGS")
-    line = "ignore:resource_tracker:UserWarning"
-    os.environ[name] = f"{before},{line}" if before else line
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
 
 
 @contextlib.contextmanager

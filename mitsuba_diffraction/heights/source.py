@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import shlex
 from collections.abc import Callable, Mapping, Sequence
@@ -15,6 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+from ..digests import key_of, sha256_of
 from ..errors import DiffractionError, counted
 from ..files import FileKind, kind_of, readable_file
 from ..settings import TableSettings
@@ -96,16 +95,16 @@ class Source:
         """
         if not self.files:
             first, *others = [field.digest() for field in self.patches]
-            return _digest_of(first, *others) if others else first
+            return key_of(first, *others) if others else first
         recipe = self.recipe
         if recipe is None:
-            return _digest_of(self.options.specified(), *map(_sha256, self.files))
+            return key_of(self.options.specified(), *map(sha256_of, map(readable_file, self.files)))
         files = [readable_file(source) for source in recipe.sources]
         if recipe.generator is not None:
             files += sorted(Path(gratings.__file__).parent.glob("*.py"))
         options = [recipe.options.specified(), self.options.specified()]
         arguments = [dict(patch) for patch in recipe.arguments]
-        return _digest_of(options, recipe.generator, arguments, *map(_sha256, files))
+        return key_of(options, recipe.generator, arguments, *map(sha256_of, files))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -293,12 +292,3 @@ def _generated(
         return generator(**arguments)
     except DiffractionError as error:
         raise DiffractionError(f"{str(recipe.path)!r}: [arguments]: {error}") from error
-
-
-def _digest_of(*parts: Any) -> str:
-    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
-
-
-def _sha256(path: Path) -> str:
-    with open(readable_file(path), "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -53,8 +53,8 @@ _OUTSET = np.array(
         [-0.14132976349843826, -0.11060664309660294, 1.2519364065950405],
     ]
 )
-# luminance of linear Rec. 2020 (BT.2020) and of linear sRGB (IEC 61966-2-1)
-_WIDE_LUMINANCE, _LUMINANCE = (0.2627, 0.6780, 0.0593), (0.2126, 0.7152, 0.0722)
+#: Luminance of linear Rec. 2020 (BT.2020) and of linear sRGB (IEC 61966-2-1)
+_WIDE_LUMINANCE, LUMINANCE = (0.2627, 0.6780, 0.0593), (0.2126, 0.7152, 0.0722)
 
 _GREY = 0.18  # reflectance that keeps its brightness
 _BELOW, _STOPS = 10.0, 16.5  # stops of the logarithm below grey, and in all
@@ -100,7 +100,7 @@ def natural_colour(linear: Colour) -> Colour:
     )
     curved = display_curve(red), display_curve(green), display_curve(blue)
     red, green, blue = (xp.power(xp.maximum(c, 0.0), _GAMMA) for c in _product(_OUTSET, curved))
-    return fitted_colour(_product(_FROM_WIDE, (red, green, blue)), _LUMINANCE, 1.0)
+    return fitted_colour(_product(_FROM_WIDE, (red, green, blue)), LUMINANCE, 1.0)
 
 
 def fitted_colour(light: Colour, luminance: Colour, most: Number) -> Colour:

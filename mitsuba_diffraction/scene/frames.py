@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import io
 import itertools
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
 from ..errors import DiffractionError, counted, warn
 from ..extras import optional
 from ..files import refuse_pipe
@@ -22,7 +21,6 @@ from ..images import open_image
 from ..progress import Progress
 from .denoise import denoised
 from .load import check_values, load_scene, preview_samples, sensor_of
-from .parameters import files_of
 from .passes import Stop, render_passes
 from .pictures import colours_of, count_bad, write_exr, write_png
 
@@ -152,7 +150,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, with_exr: bool) -> None:
     bad = count_bad(bitmap)
     if bad:
         warn(f"{frame.png}: {counted(bad, 'pixel')} not finite, and black")
-    frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
+    make_folder(frame.png.parent)  # not for a scene that fails
     if with_exr:
         write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": str(mi.variant())})
     # the PNG marks the frame as done
@@ -221,15 +219,6 @@ def _write_mp4(frames: Sequence[Path], film: Path, fps: float) -> None:
                 )
     except (OSError, RuntimeError) as error:
         raise DiffractionError(f"cannot write '{film}': {error}") from error
-
-
-def digest_of(scene: Path, values: Mapping[str, str]) -> str:
-    """Return the digest of a scene, its includes, and every file that it names."""
-    content = hashlib.sha256()
-    for file in files_of(scene, values):
-        content.update(file.name.encode())
-        content.update(file.read_bytes())
-    return content.hexdigest()[:32]
 
 
 def _settings_in(png: Path) -> dict[str, Any] | None:

@@ -37,10 +37,11 @@ _BYTES_PER_PIXEL = 128
 _GPUS = {"cuda": "CUDA", "metal": "Metal"}
 
 
-def set_variant(name: str | None) -> str:
+def set_variant(name: str | None, threads: int = 0) -> str:
     """Set a Mitsuba variant that works here, and return its name.
 
     name : a variant; `None` takes cuda_ad_spectral where a GPU answers, else llvm_ad_spectral.
+    threads : of Dr.Jit in an LLVM variant; 0 leaves them as they are.
 
     Raises a DiffractionError if there is no such variant, or no device or LLVM for it.
     """
@@ -60,6 +61,8 @@ def set_variant(name: str | None) -> str:
     if backend == "llvm":
         require_llvm()  # an unsuitable LLVM ends the process
     mi.set_variant(name)
+    if backend == "llvm" and threads and dr.thread_count() != threads:
+        dr.set_thread_count(threads)
     return name
 
 

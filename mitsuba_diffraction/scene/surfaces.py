@@ -7,7 +7,7 @@ of that id. `twosided`, `mask`, `bumpmap` and `normalmap` around it are kept.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -130,27 +130,26 @@ def _shapes_with(state: Any, number: int) -> tuple[str, ...]:
     return tuple(
         node.props.id()
         for node in state.nodes
-        if node.type == mi.ObjectType.Shape and number in _within(state, node)
+        if node.type == mi.ObjectType.Shape and number in _reached(state, [node])
     )
 
 
-def _within(state: Any, node: Any) -> Iterator[int]:
-    """Yield the numbers of the BSDFs of a shape, those within them included."""
-    for target in inner(state, node, mi.ObjectType.BSDF).values():
-        yield target
-        yield from _within(state, state.nodes[target])
+def _reached(state: Any, nodes: Iterable[Any]) -> set[int]:
+    """Return the numbers of the nodes within nodes, and within those."""
+    waiting, reached = list(nodes), set[int]()
+    while waiting:
+        new = {*targets_of(waiting.pop(), state.id_to_index).values()} - reached
+        reached |= new
+        waiting += [state.nodes[number] for number in new]
+    return reached
 
 
 def effective(state: Any) -> list[str]:
     """Return the properties of all nodes but those of BSDFs that no shape uses."""
     hidden = (mi.ObjectType.BSDF, mi.ObjectType.Texture, mi.ObjectType.Scene)
-    waiting = [n for n, node in enumerate(state.nodes) if node.type not in hidden]
-    reached: dict[int, None] = {}
-    while waiting:
-        if (number := waiting.pop()) not in reached:
-            reached[number] = None
-            waiting += targets_of(state.nodes[number], state.id_to_index).values()
-    return [str(state.nodes[number].props) for number in sorted(reached)]
+    seen = {n: node for n, node in enumerate(state.nodes) if node.type not in hidden}
+    numbers = sorted({*seen} | _reached(state, seen.values()))
+    return [str(state.nodes[number].props) for number in numbers]
 
 
 def put_surface_parameters(state: Any, values: Mapping[str, Any]) -> list[Edit]:

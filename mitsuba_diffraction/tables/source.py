@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..digests import key_of
 from ..errors import DiffractionError, warn
 from ..files import FileKind
 from ..heights import Source
@@ -24,7 +25,7 @@ from .build.build import build_with
 from .build.checks import warnings_of
 from .document import from_record, named, to_record
 from .layout import LEAST_HALF
-from .store import cached, key_of, loaded_once
+from .store import cached, loaded_once
 from .table import FORMAT_VERSION, DiffractionTable
 
 #: A table serves heights scaled by up to this times max(1, height_scale).

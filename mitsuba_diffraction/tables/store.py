@@ -71,11 +71,6 @@ class Record:
     arrays: Sequence[NDArray[Any]]
 
 
-def key_of(*parts: Any) -> str:
-    """Return a key: the SHA-256 of its parts as JSON."""
-    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
-
-
 def cached(
     kind: str,
     key: str,
@@ -114,10 +109,10 @@ def _from_disk(
     if folder is None:
         return make()
     path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
-    value = _found(path, title, unpack)
+    value = found(path, title, unpack)
     if value is None:
         with _locked(path):
-            value = _found(path, title, unpack)  # made by whoever was waited for
+            value = found(path, title, unpack)  # made by whoever was waited for
             if value is None:
                 value = make()
                 record = pack(value)
@@ -153,8 +148,13 @@ def _locked(path: Path) -> Iterator[None]:
             lock.release()
 
 
-def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
-    """Read the value in a file; None if it is missing, or damaged, with a warning."""
+def found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
+    """Read the value in a file of this title; None if it is missing, or damaged.
+
+    A damaged file is removed, with a warning: it is made again.
+
+    unpack : from the record to the value; a ValueError is for what does not fit.
+    """
     try:
         value = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
@@ -162,7 +162,7 @@ def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
     except OSError:
         return None
     except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
-        warn(f"'{path}' in the cache is damaged ({one_line(str(error))[:100]}) and made again")
+        warn(f"'{path}' is damaged ({one_line(str(error))[:100]}) and made again")
         with contextlib.suppress(OSError):
             path.unlink()
         return None

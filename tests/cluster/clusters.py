@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from mitsuba_diffraction import cluster
 from mitsuba_diffraction.cluster import FrameRequest, FrameSequence
@@ -24,10 +23,10 @@ def rendered(client, scene, **more):
     return np.array(cluster.render(scene, client=client, **arguments).bitmap)
 
 
-def film(client, scene, keep, frames=(REQUEST,), warn=pytest.fail):
+def film(client, scene, keep, frames=(REQUEST,)):
     """The film of one frame, or of these."""
     set_variant(VARIANT)
-    return FrameSequence(client, scene, frames, VARIANT, keep=keep, warn=warn, threads=1)
+    return FrameSequence(client, scene, frames, VARIANT, keep=keep, threads=1)
 
 
 def picture_of(job, progress=silent):

@@ -5,15 +5,16 @@ Files of tasks on a worker without a cache lie where no other user can put their
 
 from __future__ import annotations
 
+import hashlib
 import json
 import stat
+from concurrent.futures import CancelledError
 
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster
-from mitsuba_diffraction.cluster import jobs as jobs_module
-from mitsuba_diffraction.cluster import tasks
+from mitsuba_diffraction.cluster import calls, tasks
 from mitsuba_diffraction.cluster.jobs import WorkerCalls
 from tests.support.scans import PIXEL, SETTINGS, rough
 from tests.support.systems import posix
@@ -39,9 +40,18 @@ class _Workers:
         self.count, self.under_way, self.most = count, 0, 0
 
     def scheduler_info(self, **_):
-        return {"workers": dict.fromkeys(range(self.count))}
+        return {"workers": {key: {"nthreads": 1} for key in range(self.count)}}
 
-    def submit(self, work, *arguments, pure):
+    def wait_for_workers(self, *_, **__):
+        pass
+
+    def run(self, *_, **__):
+        return {}
+
+    def cancel(self, _):
+        pass
+
+    def submit(self, work, *arguments, pure, priority):
         self.under_way += 1
         self.most = max(self.most, self.under_way)
         return _Future(self, work, arguments)
@@ -58,14 +68,32 @@ class _Future:
     def done(self):
         return True
 
-    def cancel(self):
-        pass
-
 
 def test_few_tasks_are_under_way_however_many_there_are():
     client = _Workers(3)
     assert list(WorkerCalls(client)(abs, range(-50, 0))) == list(range(50, 0, -1))
     assert client.most == 6
+
+
+class _Losing(_Workers):
+    """Workers that are lost with every third call."""
+
+    def submit(self, *call, **how):
+        future = super().submit(*call, **how)
+        self.given = getattr(self, "given", 0) + 1
+        if self.given % 3 == 0:
+            future.work = _lost
+        return future
+
+
+def _lost(*_):
+    raise CancelledError
+
+
+def test_calls_that_were_lost_are_given_out_again():
+    calls = WorkerCalls(_Losing(2))
+    assert sorted(calls.finished(abs, [-1, -2, -3, -4])) == [(0, 1), (1, 2), (2, 3), (3, 4)]
+    assert (calls.report.tasks, calls.report.retries) == (4, 1)
 
 
 def test_an_error_on_a_worker_is_one_line_with_its_name():
@@ -74,14 +102,14 @@ def test_an_error_on_a_worker_is_one_line_with_its_name():
 
 
 def test_a_late_worker_with_another_version_is_named(monkeypatch):
-    monkeypatch.setattr(jobs_module, "versions", lambda: ("0.1", "0.1", "0.1"))
+    monkeypatch.setattr(calls, "versions", lambda: ("0.1", "0.1", "0.1"))
     with pytest.raises(DiffractionError, match=r"^worker this process: it has .* the client 0\.1"):
         list(WorkerCalls(_Workers(1))(abs, [1]))
 
 
 def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):
     with pytest.raises(DiffractionError, match="periodic=open"):
-        cluster.build(HeightField(scan.heights, PIXEL), client=None, **SETTINGS)
+        cluster.build(HeightField(scan.heights, PIXEL), client=_Workers(1), **SETTINGS)
 
 
 def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_path, monkeypatch):
@@ -103,8 +131,9 @@ def test_without_a_cache_the_folder_is_new_and_private(tmp_path, monkeypatch):
     monkeypatch.setattr(tasks.tempfile, "tempdir", str(tmp_path))
     monkeypatch.setattr(tasks, "cache_folder", lambda: None)
     tasks._own_temporary.cache_clear()
-    files = tasks.SceneFiles("/a/scene.xml", (), (("/a/scene.xml", "0" * 64),))
-    files.keep({"0" * 64: b"<scene/>"})
+    digest = hashlib.sha256(b"<scene/>").hexdigest()
+    files = tasks.SceneFiles("/a/scene.xml", (), (("/a/scene.xml", digest),))
+    files.require({digest: b"<scene/>"})
     (made,) = (folder for folder in tmp_path.iterdir() if folder.name != "mitsuba_diffraction")
     assert stat.S_IMODE(made.stat().st_mode) == 0o700
     assert [*(tmp_path / "mitsuba_diffraction").iterdir()] == []

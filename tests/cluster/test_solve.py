@@ -11,7 +11,7 @@ pytest.importorskip("gratinglab")
 
 from mitsuba_diffraction import solve_orders
 from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.cluster.workers import executor_of
+from mitsuba_diffraction.cluster.jobs import WorkerCalls
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.solve import Settings
 from mitsuba_diffraction.orders.solve.jobs import Jobs
@@ -44,9 +44,8 @@ def test_a_killed_worker_changes_no_bit(client, table, tmp_path):
             killed.append(next(iter(client.cluster.workers.values())).pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    with executor_of(client) as workers:
-        jobs = Jobs(executor=workers, progress=disturb)
-        on_workers = solve_orders(PROFILE, "none", settings=SETTINGS, jobs=jobs)
+    jobs = Jobs(calls=WorkerCalls(client).finished, progress=disturb)
+    on_workers = solve_orders(PROFILE, "none", settings=SETTINGS, jobs=jobs)
     assert killed
     assert digest_in_file(on_workers, tmp_path) == digest_in_file(table, tmp_path)
     client.wait_for_workers(2, timeout=300)

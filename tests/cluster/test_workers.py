@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-import re
 
 import distributed
 import psutil
 import pytest
 
-from mitsuba_diffraction import DiffractionError, cluster
+from mitsuba_diffraction import DiffractionError, DiffractionWarning, cluster
 from mitsuba_diffraction.cluster import workers
 from tests.cluster.clusters import VARIANT, Recorder, film, rendered
 from tests.support.machine import python
+from tests.support.systems import posix
 
 pytestmark = pytest.mark.thorough
 
@@ -30,11 +30,12 @@ def test_other_versions_are_refused_by_name(number, client, scene, monkeypatch):
 
 def test_a_process_without_llvm_says_so_as_a_worker():
     code = (
-        "from mitsuba_diffraction.cluster.workers import trouble_of_process, versions\n"
-        f"print(trouble_of_process(versions(), {VARIANT!r}))"
+        "from mitsuba_diffraction.cluster.tasks import called, versions\n"
+        "from mitsuba_diffraction.scene import set_variant\n"
+        f"called(versions(), set_variant, {VARIANT!r})"
     )
     ran = python(code, DRJIT_LIBLLVM_PATH="/none/libLLVM.so")
-    assert ran.stdout.startswith('DRJIT_LIBLLVM_PATH="/none/libLLVM.so": there is no such file')
+    assert 'DRJIT_LIBLLVM_PATH="/none/libLLVM.so": there is no such file' in ran.stderr
 
 
 def test_workers_with_several_dask_threads_are_refused():
@@ -63,11 +64,15 @@ def test_a_scheduler_file_stands_for_the_address(client, tmp_path):
 
 
 def test_workers_with_too_little_memory_are_named(scene, tmp_path):
-    lines = []
-    job = film(Recorder(memory_limit=1e8), scene, tmp_path, warn=lines.append)
+    words = r"worker one may use 0\.1 GB, .* estimated to need 0\.5 GB"
+    with pytest.warns(DiffractionWarning, match=words):
+        job = film(Recorder(memory_limit=1e8), scene, tmp_path)
     assert job.needed > 5e8
-    (line,) = lines
-    assert re.search(r"worker one may use 0\.1 GB, .* estimated to need 0\.5 GB", line)
+
+
+@posix
+def test_workers_are_out_of_the_terminal_s_reach(client):
+    assert os.getsid(0) not in client.run(os.getsid, 0).values()
 
 
 def test_pages_of_workers_are_for_this_machine_alone(client):

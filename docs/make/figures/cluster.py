@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mitsuba_diffraction.cluster import FrameRequest, FrameSequence, connect
-from mitsuba_diffraction.errors import warn
 from mitsuba_diffraction.orders.solve import jobs
 from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.scene import Stop, load_scene, render_passes, set_variant
@@ -48,8 +47,7 @@ def on_workers(client: Any, scene: Path, frames: int) -> Seconds:
     set_variant(VARIANT)
     with tempfile.TemporaryDirectory() as folder:
         film = FrameSequence(
-            client, scene, requests(frames), VARIANT, keep=Path(folder, "passes"), warn=warn,
-            threads=1,
+            client, scene, requests(frames), VARIANT, keep=Path(folder, "passes"), threads=1,
         )  # fmt: skip
         start, before = time.perf_counter(), processor_of(client)
         assert len(list(film.render(Stop(), silent))) == frames

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -20,9 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Complex, Real
+from ...atomic import make_folder
 from ...errors import DiffractionError, check_choice, one_line
 from ...progress import Progress, silent
-from ...tables.store import Record, read_record, write_record
+from ...system import environment
+from ...tables.store import Record, found, write_record
 from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
 from .crossed import CrossedWaves
@@ -32,6 +34,9 @@ from .sheet import sheet_efficiencies
 from .stations import LEAST_COSINE, Grating, Solver, on_both_sides
 
 Spot = TypeVar("Spot", bound=AnyPlace)
+#: Calls a function with each argument, and yields the number and the result of a call as it
+#: finishes.
+Calls = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[tuple[int, Any]]]
 
 #: Solvers by name: from a profile, a resolution (points on the boundary; harmonics) and, where they
 #: solve layers, a structure.
@@ -201,6 +206,24 @@ def solve_place(problem: Problem, place: AnyPlace) -> Solved:
     return Solved(values.astype(np.complex64), time.thread_time() - start)
 
 
+def calls_here(work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[tuple[int, Any]]:
+    """Call a function in this process, in the order of the arguments; see `Calls`."""
+    return enumerate(map(work, arguments))
+
+
+def calls_in(
+    pool: Executor, work: Callable[[Any], Any], arguments: Iterable[Any]
+) -> Iterator[tuple[int, Any]]:
+    """Call a function in the processes of a pool; see `Calls`."""
+    futures = {pool.submit(work, argument): n for n, argument in enumerate(arguments)}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
 @dataclass
 class Jobs:
     """Where stations are solved, and kept: none is solved twice.
@@ -209,13 +232,13 @@ class Jobs:
     ----------
     folder : of results, which another run finds again, made when needed; None keeps them in memory
         alone.
-    executor : processes or a cluster; None solves here.
+    calls : solves, in other processes or on a cluster; by default here, a place after the other.
     progress : called as progress(done, total, text).
     announce : called with the `settings.Estimate` of each stage before it starts; None for none.
     """
 
     folder: Path | None = None
-    executor: Executor | None = None
+    calls: Calls = calls_here
     progress: Progress = silent
     announce: Callable[[Any], None] | None = None
     _known: dict[str, Solved] = field(default_factory=dict, init=False)
@@ -239,8 +262,8 @@ class Jobs:
             make_folder(self.folder)
         done = len(names) - len(missing)
         self.progress(done, len(names), text)
-        for place, solved in self._solved(problem, missing):
-            name = names[place]
+        for n, solved in self.calls(partial(solve_place, problem), missing):
+            name = names[missing[n]]
             self._known[name] = solved
             if self.folder is not None:
                 record = Record({"seconds": solved.seconds}, [solved.values])
@@ -254,8 +277,9 @@ class Jobs:
         names = _names(problem, places)
         if self.folder is not None:
             for name in names.values():
-                if name not in self._known and (solved := _read(self._file(name), name)):
-                    self._known[name] = solved
+                if name not in self._known:
+                    solved = found(self._file(name), _title(name), _solved_in)
+                    self._known |= {name: solved} if solved else {}
         return [place for place, name in names.items() if name not in self._known]
 
     def _file(self, name: str) -> Path:
@@ -269,21 +293,8 @@ class Jobs:
 
     def seconds(self, problem: Problem, place: AnyPlace) -> float:
         """Return the processor seconds that a place takes."""
-        if self.executor is None:
-            return timed(problem, place)
-        return float(self.executor.submit(timed, problem, place).result())
-
-    def _solved(self, problem: Problem, places: Iterable[Spot]) -> Iterator[tuple[Spot, Solved]]:
-        if self.executor is None:
-            yield from ((place, solve_place(problem, place)) for place in places)
-            return
-        futures = {self.executor.submit(solve_place, problem, place): place for place in places}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+        ((_, seconds),) = self.calls(partial(timed, problem), [place])
+        return float(seconds)
 
 
 def _names(problem: Problem, places: Iterable[Spot]) -> dict[Spot, str]:
@@ -304,11 +315,10 @@ def processes(count: int) -> Iterator[Executor]:
 
     Raises a DiffractionError if one of them is killed.
     """
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
     pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_begin)
     try:
-        yield pool
+        with environment(dict.fromkeys(_THREADS, "1")):
+            yield pool
     except BrokenExecutor as error:
         raise DiffractionError(
             "a process was killed, maybe for lack of memory; use fewer of them, and run the same "
@@ -321,11 +331,6 @@ def processes(count: int) -> Iterator[Executor]:
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _begin() -> None:
@@ -341,20 +346,6 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def make_folder(folder: Path) -> None:
-    """Make a folder of results.
-
-    Raises a DiffractionError if it cannot be written.
-    """
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise DiffractionError(
-            f"cannot write '{folder}': {error.strerror}; choose a folder that exists and is "
-            "writable"
-        ) from error
-
-
 def remove_results(folder: Path) -> None:
     """Remove the results in a folder, and the folder once it is empty."""
     with suppress(OSError):
@@ -363,15 +354,12 @@ def remove_results(folder: Path) -> None:
         folder.rmdir()
 
 
-def _read(file: Path, name: str) -> Solved | None:
-    """Return a stored result; None if there is none, or a damaged one, which is solved again."""
-    try:
-        record = read_record(file, _title(name))
-        (values,) = record.arrays
-        solved = Solved(values, float(record.document["seconds"]))
-        return solved if np.isfinite(values).all() else None
-    except (OSError, ValueError, LookupError, TypeError, MemoryError, RecursionError):
-        return None
+def _solved_in(record: Record) -> Solved:
+    """Return a stored result; raises a ValueError if a number of it is not finite."""
+    (values,) = record.arrays
+    if not np.isfinite(values).all():
+        raise ValueError("a number is not finite")
+    return Solved(values, float(record.document["seconds"]))
 
 
 def _title(name: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,6 +15,7 @@ from ...errors import DiffractionError
 from ...plugin.description import Mix, Surface
 from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
+from ...scene.elements import attribute_of
 from .packing import colour_weights
 
 #: Wavelengths (n,) in nm, and values (n,).
@@ -72,8 +72,7 @@ def raw_picture(bsdf: Any, name: str, channels: int, scale: float, shift: float 
 
 def colour_map(texture: Any, light: Spectrum) -> Map:
     """Return a texture of reflectances in linear sRGB, to be multiplied with the light's colour."""
-    attribute = _attribute(texture)
-    if attribute is not None:
+    if attribute := attribute_of(texture):
         return Map(np.ones(3), attribute=attribute)
     import mitsuba as mi
 
@@ -118,8 +117,8 @@ def axis_map(described: Surface) -> Map:
     if turned.texture is None and stretched.texture is None:
         angle = np.radians(turned.number)
         return Map(np.array([np.cos(angle), np.sin(angle), stretched.number]))
-    attribute = None if turned.texture is None else _attribute(turned.texture)
-    if attribute is not None and stretched.texture is None:
+    attribute = attribute_of(turned.texture)
+    if attribute and stretched.texture is None:
         return Map(np.array([1.0, 0.0, stretched.number]), attribute=attribute)
 
     def frame(uv: Real) -> Real:
@@ -156,7 +155,7 @@ def _picture(textures: Sequence[Any], look_up: Callable[[Real], Real], name: str
     """Evaluate a function of textures at the texels of the largest one."""
     sizes, transforms = [], []
     for texture in textures:
-        if _attribute(texture) is not None:
+        if attribute_of(texture):
             raise DiffractionError(
                 f"{name}: a mesh attribute is not supported by the shaders; use textures, or "
                 "render the scene with Mitsuba"
@@ -195,14 +194,6 @@ def _clamps(look_up: Callable[[Real], NDArray[np.floating]], to_uv: Real) -> boo
 
     beyond = values(-0.3)
     return bool(np.abs(beyond - values(1e-4)).sum() < np.abs(beyond - values(0.7)).sum())
-
-
-def _attribute(texture: Any) -> str | None:
-    """Return the name of the mesh attribute that a texture reads, or None."""
-    if texture.class_name() != "MeshAttribute":
-        return None
-    match = re.search(r'name = "?(\w+)', str(texture))
-    return match[1] if match else None
 
 
 def _centres(texture: Any, width: int, height: int) -> tuple[Real, Real]:

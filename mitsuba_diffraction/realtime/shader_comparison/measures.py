@@ -11,10 +11,10 @@ from scipy.ndimage import label, uniform_filter
 
 from ...extras import optional
 from ...optics.colour import delta_e, encode_srgb
+from ...optics.display import LUMINANCE
 
 Image = NDArray[np.floating]
 
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 #: Percentiles of ΔE2000 that a comparison reports.
 PERCENTILES = (50, 90, 99)
 
@@ -71,7 +71,7 @@ def dark_region(reference: Image, other: Image) -> float:
     """
     side = max(1, round(0.03 * np.shape(reference)[1]))
     first, second = (
-        uniform_filter(np.asarray(image, float) @ _LUMINANCE, side, mode="nearest")
+        uniform_filter(np.asarray(image, float) @ LUMINANCE, side, mode="nearest")
         for image in (reference, other)
     )
     regions, count = label(second < 0.5 * first)

@@ -229,7 +229,7 @@ def build_with(
 ) -> DiffractionTable:
     """Build a table as `build_table`, without its warnings (`checks.warnings_of`).
 
-    run : what does the work of windows, as `map` does here.
+    run : what does the work of windows, as `map` does here; tables without windows have no other.
     """
     scans = [heights] if not isinstance(heights, Iterable) else list(heights)
     if not all(isinstance(scan, HeightField) for scan in scans):
@@ -239,6 +239,11 @@ def build_with(
         )
     settings = resolved(settings, scans)
     check_patches(scans, settings)
+    if settings.taper_width is None and run is not map:
+        raise DiffractionError(
+            "workers build tables of windows: give a scan (periodic=open), or windows=W, or do "
+            "without workers"
+        )
     screens = screens_of(scans, settings, run)
     check_units(scans)
     try:

@@ -22,12 +22,13 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...digests import key_of
 from ...errors import warn
 from ...optics.colour import delta_e, linear_srgb, response
 from ..build.coefficients import half_scale
 from ..expansion import Expansion
 from ..powers import series_kind
-from ..store import Record, cached, key_of
+from ..store import Record, cached
 from ..table import DiffractionTable
 from .build import VISIBLE, OtherOrders, PolarGrid, lobe_of, order_0_colour
 

@@ -21,11 +21,12 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Real, Single
+from ...digests import key_of
 from ...optics.geometry import LAST_ANGLE
 from ...optics.paths import Path
 from ..directional import DirectionalTable, DirectionGrid, LinearMap
 from ..order_mixture import MOST_STRONG, STRONG
-from ..store import Record, cached, key_of
+from ..store import Record, cached
 from ..table import DiffractionTable
 from .conserved import Reflector, Transmitter
 from .gain import thick

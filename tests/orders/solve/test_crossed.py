@@ -119,17 +119,19 @@ def test_an_interrupted_solution_goes_on(tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        md.solve_orders(flat, 1.5, **asked, jobs=Jobs(folder, None, interrupt))
+        md.solve_orders(flat, 1.5, **asked, jobs=Jobs(folder, progress=interrupt))
     assert len(list(folder.iterdir())) == 2
     told = []
     table = md.solve_orders(
-        flat, 1.5, **asked, jobs=Jobs(folder, None, lambda *now: told.append(now[0]))
+        flat, 1.5, **asked, jobs=Jobs(folder, progress=lambda *now: told.append(now[0]))
     )
     assert told[0] == 2
     assert table.efficiency(0.0, 0.0, 500.0, 0, 0) == pytest.approx(0.04, rel=1e-3)
     # another material has results of its own
     told.clear()
-    md.solve_orders(flat, 1.6, **asked, jobs=Jobs(folder, None, lambda *now: told.append(now[0])))
+    md.solve_orders(
+        flat, 1.6, **asked, jobs=Jobs(folder, progress=lambda *now: told.append(now[0]))
+    )
     assert told[0] == 0
 
 

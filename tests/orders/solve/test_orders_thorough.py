@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of, processes, solve_place
+from mitsuba_diffraction.orders.solve.jobs import Jobs, calls_in, problem_of, processes, solve_place
 from mitsuba_diffraction.orders.solve.nodes import Place
 from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import lamellar, polygon, sinusoidal
@@ -30,7 +32,7 @@ def test_a_solution_is_the_same_in_this_process_and_another():
     problem = problem_of(Grating(PROFILE, material_of("none", RANGE), 1.0, RANGE), "integral", 48)
     place = Place(1, 0, 0.3, 0.4, (0.5,))
     with processes(1) as pool:
-        elsewhere = Jobs(executor=pool).amplitudes(problem, [place], "")[place]
+        elsewhere = Jobs(calls=partial(calls_in, pool)).amplitudes(problem, [place], "")[place]
     # sums of BLAS in another order, rounded to single precision
     assert np.allclose(elsewhere, solve_place(problem, place).values, atol=1e-7)
 
