@@ -9,8 +9,10 @@ import argparse
 import csv
 import io
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
+from . import pages
 from .pages import option, program, write_text
 
 #: Rows from which a table is a file.
@@ -36,6 +38,12 @@ def write_page(path: Path, text: str) -> list[Path]:
     for name, content in (*tables.items(), (path.name, shown)):
         write_text(path.parent / name, content)
     return [path, *(path.parent / name for name in tables)]
+
+
+def update(path: Path, parts: Mapping[str, str]) -> None:
+    """Replace parts of a page by name, whose long tables are files beside it."""
+    pages.update(path, parts)
+    write_page(path, path.read_text(encoding="utf-8"))
 
 
 def separated(text: str, stem: str) -> tuple[str, dict[str, str]]:
