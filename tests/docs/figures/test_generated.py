@@ -47,7 +47,7 @@ def test_the_page_has_the_numbers_of_the_shipped_tables(monkeypatch):
         rows = (line for line in text.splitlines() if line.startswith("|"))
         return [number for row in rows for number in re.findall(r"\d+(?:\.\d+)?", row)]
 
-    made = numbers(solved.text())
+    made = numbers(solved.table())
     assert len(made) > 20
     assert numbers(pages.part(PAGES["docs/orders.md"], "solved")) == made
 
