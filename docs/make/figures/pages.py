@@ -76,16 +76,6 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
     write_text(file, text)
 
 
-def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
-    """Replace the parts that a file has markers for."""
-    present = {name: parts[name] for name in markers(path) if name in parts}
-    if not present:
-        raise DiffractionError(
-            f"'{path}' has none of the markers {', '.join(f'<!-- begin {n} -->' for n in parts)}"
-        )
-    update(path, present)
-
-
 def markers(path: str | os.PathLike[str]) -> list[str]:
     """Return the names of the parts that a file has markers for."""
     return re.findall(r"<!-- begin (\S+) -->", _read(Path(path)))
