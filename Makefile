@@ -73,7 +73,7 @@ bench: setup  ## measure speed and noise: docs/performance.md
 figures: setup  ## make the pictures in docs/images
 	@$(PYTHON3) -m docs.make.figures.pictures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
 
-gallery: setup  ## make docs/gallery.md and the pictures of docs/meshes.md
+gallery: setup  ## make the pictures of docs/gallery.md and docs/meshes.md
 	@$(PYTHON3) -m docs.make.figures.gallery -o docs
 
 evaluation: setup  ## make docs/thesis.md: ridges, grating equation, fitted periods

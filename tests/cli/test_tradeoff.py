@@ -46,7 +46,8 @@ def test_the_command_measures_and_recommends(tmp_path, monkeypatch, run, capfd):
     assert all(0.0 < record["error"] <= 1e-2 for record in document["settings"])
     assert (out / "tradeoff.csv").read_text("utf-8").startswith("group,setting,")
     page, images = tmp_path / "page.md", tmp_path / "images"
-    page.write_text("<!-- begin settings -->\nstale\n<!-- end settings -->\n", "utf-8")
+    parts = (f"<!-- begin {n} -->\nstale\n<!-- end {n} -->\n" for n in ("settings", "spectral"))
+    page.write_text("".join(parts), "utf-8")
     images.mkdir()
     assert tables.main(["tradeoff", str(out), "-o", str(page), "--images", str(images)]) == 0
     assert f"| {coarse} | {document['settings'][1]['error']:.1e} |" in page.read_text("utf-8")

@@ -19,7 +19,6 @@ from mitsuba_diffraction.system import peak_memory
 
 from .figures import Goal, Plan, Row, Section
 
-_COLUMNS = ("s", "s of all cores", "GB at most", "GB above the import", "error/tolerance")
 #: Side of the patch: seconds and GB that its table may take at the default tolerance.
 _GOALS = {1332: (4.0, 0.6), 4096: (40.0, 2.5), 8192: (300.0, 6.0)}
 
@@ -66,7 +65,7 @@ def measure_builds(plan: Plan, folder: Path, progress: Progress) -> Section:
         "build: a table of gratings.elaphe_like, pixels of "
         f"{PIXEL:.4g} µm, its error measurement included; each once, in a process of its own"
     )
-    return Section(title, _COLUMNS, rows)
+    return Section(title, rows)
 
 
 def _measured(case: Case, folder: Path) -> Row:
@@ -74,13 +73,12 @@ def _measured(case: Case, folder: Path) -> Row:
         report = child(_build, _heights(case.side, folder), case.arguments)
     peak, imported = report["peak_bytes"] / 1e9, report["imported_bytes"] / 1e9
     error = max(report["table"]["measured_error"].values()) / report["table"]["tolerance"]
-    values = (report["seconds"], report["cpu_seconds"], peak, peak - imported, error)
-    return Row(
-        case.name,
-        dict(zip(_COLUMNS, values, strict=True)),
-        case.goals(report["seconds"], peak),
-        {"arguments": case.arguments, **report},
-    )
+    values = {
+        "s": report["seconds"], "s of all cores": report["cpu_seconds"], "GB at most": peak,
+        "GB above the import": peak - imported, "error/tolerance": error,
+    }  # fmt: skip
+    goals = case.goals(report["seconds"], peak)
+    return Row(case.name, values, goals, {"arguments": case.arguments, **report})
 
 
 def _heights(side: int, folder: Path) -> Path:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,8 +39,6 @@ from .kernels import kernel_operations, kernel_time, vector_lanes
 from .scenes import pigment, rays, snake
 
 FLOOR = "bare gathers of the defaults"
-_TIMES, _CPU, _OPERATIONS = "ns/call", "CPU ns/call", "operations"
-_EVAL = "× eval"
 _BASELINES = {
     "× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× patch": ONE_WINDOW, "× gathers": FLOOR,
 }  # fmt: skip
@@ -58,7 +55,6 @@ _LIGHTS = ((0.0, 0.0), (30.0, 0.0), (30.0, 90.0), (60.0, 45.0))
 _STEP = 2.5  # nm
 _SUN = (-0.4, 0.6, 0.8)  # towards it
 _RAYS = 4  # along each side of a pixel
-_COLUMNS = ("mean ΔE2000", "99th percentile", "pixels")
 
 
 def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
@@ -117,8 +113,8 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
         title = f"{what}: {_conditions(plan, tables)}"
         section = timed_section(title, called(timed, what), goals)
         for row in section.rows:
-            row.values[_EVAL] = evals[row.name]
-        sections.append(replace(section, columns=(*section.columns, _EVAL)))
+            row.values["× eval"] = evals[row.name]
+        sections.append(section)
     return sections
 
 
@@ -194,13 +190,13 @@ def timed_section(
     rows = []
     for name, (clock, processor, lanes, operations) in timed.items():
         values: dict[str, float | None] = {
-            _TIMES: statistics.median(clock), _CPU: statistics.median(processor),
+            "ns/call": statistics.median(clock), "CPU ns/call": statistics.median(processor),
             **{heading: ratio(clock, timed[each].clock) for heading, each in baselines.items()},
-            _OPERATIONS: operations,
+            "operations": operations,
         }  # fmt: skip
         raw = {"ns": clock, "cpu_ns": processor, "lanes": lanes}
         rows.append(Row(name, values, goals.get(name, ()), raw))
-    return Section(title, (_TIMES, _CPU, *baselines, _OPERATIONS), rows)
+    return Section(title, rows)
 
 
 def measure_colours(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> list[Section]:
@@ -232,7 +228,6 @@ def measure_colours(plan: Plan, tables: Tables, scenes: Path, progress: Progress
     differences = Section(
         f"colours: {rgb} against {spectral} at {_STEP:g} nm, {plan.map_resolution}² directions of "
         f"view for each of {len(_LIGHTS)} of the light; and the snake",
-        _COLUMNS,
         rows,
     )
     cost = _cost(plan, tables, rgb, spectral)
@@ -245,8 +240,8 @@ def _difference(name: str, reference: Any, other: Any, strict: bool) -> Row:
     differences = differences[np.isfinite(differences)]
     mean, high = float(differences.mean()), float(np.percentile(differences, 99.0))
     goals = [Goal("mean at most 1", mean <= 1.0), Goal("99 % at most 3", high <= 3.0)]
-    values = (mean, high, float(differences.size))
-    return Row(name, dict(zip(_COLUMNS, values, strict=True)), goals if strict else [])
+    values = {"mean ΔE2000": mean, "99th percentile": high, "pixels": float(differences.size)}
+    return Row(name, values, goals if strict else [])
 
 
 def _map(tables: Tables, variant: str, parameters: dict[str, Any], resolution: int) -> Any:
@@ -305,15 +300,16 @@ def _cost(plan: Plan, tables: Tables, rgb: str, spectral: str) -> Section:
         nanoseconds[variant] = statistics.median(timed[variant].clock)
     times = nanoseconds[rgb] / nanoseconds[spectral]
     megabytes = table.nbytes / 1e6
-    columns = ("MB", "s to build", "eval, ns/call", "× spectral")
     goals = [
         Goal("at most 64 MB", megabytes <= 64.0),
         Goal("60 s", built <= 60.0),
         Goal("0.5× spectral", times <= 0.5),
     ]
-    values = (megabytes, built, nanoseconds[rgb], times)
+    values = {
+        "MB": megabytes, "s to build": built, "eval, ns/call": nanoseconds[rgb],
+        "× spectral": times,
+    }  # fmt: skip
     return Section(
         "colour table: of the defaults, what the RGB variants look up",
-        columns,
-        [Row(tables.patch, dict(zip(columns, values, strict=True)), goals, {"ns": nanoseconds})],
+        [Row(tables.patch, values, goals, {"ns": nanoseconds})],
     )

@@ -59,7 +59,7 @@ class Row:
     """Measurements of one contender or case."""
 
     name: str  # what it is
-    values: dict[str, float | None]  # by column; None where a column does not apply
+    values: dict[str, float | None]  # by column with its unit; None where it does not apply
     goals: Sequence[Goal] = ()  # of this row
     # all single measurements and whatever else belongs to them, as plain data
     raw: dict[str, Any] = field(default_factory=dict)
@@ -70,8 +70,7 @@ class Section:
     """A table of rows."""
 
     title: str  # what was measured, and how
-    columns: Sequence[str]  # heading of each column, with its unit
-    rows: Sequence[Row]  # what was measured
+    rows: Sequence[Row]  # what was measured, all with the same columns
 
     @property
     def goals(self) -> list[Goal]:
@@ -80,10 +79,8 @@ class Section:
 
     def lines(self) -> Iterator[str]:
         """Text for people: aligned columns, goals at the end of the lines."""
-        head = ["", *self.columns]
-        body = [
-            [row.name, *(_number(row.values.get(c)) for c in self.columns)] for row in self.rows
-        ]
+        head = ["", *self.rows[0].values]
+        body = [[row.name, *map(_number, row.values.values())] for row in self.rows]
         widths = [max(map(len, column)) for column in zip(head, *body, strict=True)]
         yield self.title
         for cells, row in zip([head, *body], [None, *self.rows], strict=True):

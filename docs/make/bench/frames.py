@@ -69,4 +69,4 @@ def measure_frames(plan: Plan, tables: Tables, scenes: Path, progress: Progress)
         f"frames: {driver}, scenes/snake.xml, {width} × {height} pixels, one sample per pixel; "
         f"medians of {plan.rounds} rounds"
     )
-    return Section(title, ("frames/s", "ms"), rows)
+    return Section(title, rows)

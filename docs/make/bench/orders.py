@@ -15,7 +15,7 @@ from mitsuba_diffraction.progress import Progress
 from .contenders import ALUMINIUM
 from .evaluation import called, calls_of, time_calls, timed_section
 from .figures import Goal, Plan, Row, Section
-from .scenes import NOISE, noise_row
+from .scenes import noise_row
 
 #: Shipped tables, bare and under a clear layer.
 _TABLES = {"blazed grating, Al": "blazed.nc", "CD": "cd.nc"}
@@ -58,7 +58,7 @@ def _times(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
         f"medians of {plan.rounds} rounds"
     )
     rows = [replace(row, name=f"{s.title} {row.name}") for s in sections for row in s.rows]
-    return Section(title, sections[0].columns, rows)
+    return Section(title, rows)
 
 
 def _noise(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
@@ -68,4 +68,4 @@ def _noise(plan: Plan, bsdfs: dict[str, Any], progress: Progress) -> Section:
             progress(len(rows), len(bsdfs) * len(_NOISE), "noise")
             rows.append(noise_row(f"{name}, {theta:g}°", bsdf, theta, most, plan.lanes))
     title = "noise of solved orders: relative standard deviation of one sample's albedo"
-    return Section(title, NOISE, rows)
+    return Section(title, rows)

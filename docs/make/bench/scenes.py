@@ -25,8 +25,6 @@ _GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
 AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
 #: Wavelengths of the light whose noise is measured, nm.
 WAVELENGTHS = (450.0, 550.0, 650.0)
-#: Columns of the noise of one sample over these.
-NOISE = ("least", "median", "most", "largest weight")
 # Seed of random numbers; share of directions that the plugin draws evenly
 _SEED, _EVEN = 20140113, 0.03
 #: Samples a pixel of the rendering in which bright pixels are looked for.
@@ -146,11 +144,11 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Relative standard deviation of one sample's estimate of the directional albedo."""
     orders = tables.bsdf("default", material="none", energy_conserving=False)
     cosine = draws_by_cosine(tables.bsdf("default", material="none", energy_conserving=False))
-    columns, rows = (*NOISE, "by the cosine"), []
+    rows = []
     for n, (theta, goal) in enumerate(_GOALS.items()):
         progress(n, len(_GOALS), "noise")
         row = noise_row(f"{theta:g}°", orders, theta, goal, plan.lanes)
-        row.values[columns[-1]] = deviation_of(cosine, theta, 0.0, 550.0, plan.lanes)[0]
+        row.values["by the cosine"] = deviation_of(cosine, theta, 0.0, 550.0, plan.lanes)[0]
         rows.append(row)
     progress(len(_GOALS), len(_GOALS), "noise")
     title = (
@@ -158,30 +156,28 @@ def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
         f"{len(AZIMUTHS)} azimuths of the light and {len(WAVELENGTHS)} wavelengths from "
         f"{WAVELENGTHS[0]:g} to {WAVELENGTHS[-1]:g} nm"
     )
-    return Section(title, columns, rows)
+    return Section(title, rows)
 
 
 def noise_row(name: str, bsdf: Any, theta: float, most: float, lanes: int) -> Row:
-    """Return `NOISE` of a BSDF for light at an angle; `most` is the goal."""
+    """Return the noise of one sample for light at an angle; `most` is the goal."""
     samples = [
         deviation_of(bsdf, theta, phi, wavelength, lanes)
         for phi in AZIMUTHS
         for wavelength in WAVELENGTHS
     ]
     deviations, weights = (list(column) for column in zip(*samples, strict=True))
-    values = (min(deviations), float(np.median(deviations)), max(deviations), max(weights))
-    return Row(
-        name,
-        dict(zip(NOISE, values, strict=True)),
-        [Goal(f"at most {most:g}", max(deviations) <= most)],
-        {"standard deviations": deviations},
-    )
+    values: dict[str, float | None] = {
+        "least": min(deviations), "median": float(np.median(deviations)), "most": max(deviations),
+        "largest weight": max(weights),
+    }  # fmt: skip
+    goals = [Goal(f"at most {most:g}", max(deviations) <= most)]
+    return Row(name, values, goals, {"standard deviations": deviations})
 
 
 def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
     """Variance × time of pictures, against drawing by the cosine; and pixels far too bright."""
     size = plan.resolution
-    columns = ("variance × time, ratio", "variance, ratio", "time, ratio", "brightest pixel, ratio")
 
     def bsdf() -> Any:
         return tables.bsdf("default", material="none")
@@ -199,18 +195,21 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
         cosine_variance, cosine_seconds = _variance_and_time(cosine, pixels, plan)
         ratio = cosine_variance * cosine_seconds / (variance * seconds)
         brightest = _brightest(orders, pixels, plan)
-        values = (ratio, cosine_variance / variance, cosine_seconds / seconds, brightest)
+        values: dict[str, float | None] = {
+            "variance × time, ratio": ratio, "variance, ratio": cosine_variance / variance,
+            "time, ratio": cosine_seconds / seconds, "brightest pixel, ratio": brightest,
+        }  # fmt: skip
         goals = [Goal("at least 100×", ratio >= 100.0)]
         if name.startswith("snake"):
             goals.append(Goal("brightest within 5×", brightest <= 5.0))
-        rows.append(Row(name, dict(zip(columns, values, strict=True)), goals))
+        rows.append(Row(name, values, goals))
     progress(len(cases), len(cases), "efficiency")
     title = (
         "efficiency: drawing by the cosine over our own, path integrator, material=none, variance "
         f"of the body's pixels; their brightest at {FIREFLY_SPP} samples a pixel over that at "
         f"{plan.reference_spp}"
     )
-    return Section(title, columns, rows)
+    return Section(title, rows)
 
 
 def draws_by_cosine(bsdf: Any) -> Any:

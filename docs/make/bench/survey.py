@@ -19,7 +19,6 @@ from .figures import FULL, Goal, Plan, Row, Section
 
 #: Seconds that the scans of a full run may take on two cores.
 MOST = 60.0
-_COLUMNS = ("s", "s a scan", "s of all cores a scan")
 _SIDE, _PIXELS = 10.0, 256  # µm, and pixels a side
 
 
@@ -34,14 +33,17 @@ def measure_survey(plan: Plan, folder: Path, progress: Progress) -> Section:
         progress(n, len(ways), f"survey, {name}")
         seconds, busy = _timed(files, folder / name.split()[0], options)
         goals = [Goal(f"at most {MOST:g} s", seconds <= MOST)] if plan.scans == FULL.scans else []
-        values = seconds, seconds / plan.scans, busy / plan.scans
-        rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals))
+        values = {
+            "s": seconds, "s a scan": seconds / plan.scans,
+            "s of all cores a scan": busy / plan.scans,
+        }  # fmt: skip
+        rows.append(Row(name, values, goals))
     progress(len(ways), len(ways), "surveyed")
     return Section(
         f"survey: {plan.scans} scans of {_SIDE:g} µm, {_PIXELS}² pixels, each way once, with an "
         "empty cache and the start of the processes",
-        _COLUMNS, rows,
-    )  # fmt: skip
+        rows,
+    )
 
 
 def _scans(folder: Path, count: int) -> list[Path]:

@@ -3,9 +3,9 @@
 Contents
 --------
 pictures                pictures: heights and their light, BRDF maps, the scenes' snakes
-gallery                 a picture of every scene, and the pages that show them
+gallery                 a picture of every scene, by the commands on its page
 geometry                drawing of angles, axes, grooves and window in docs/concepts.md
-interfaces              docs/commands.md, python.md and parameters.md, and tables of formats
+interfaces              tables of commands, names, parameters and formats, from the code
 long_tables             long tables of pages as CSV files beside them
 presets                 balls of all presets
 tables                  tables of what `bench`, `tradeoff`, `plan` and `info --energy` measured

@@ -1,4 +1,4 @@
-"""Pages that the code writes: docs/commands.md, python.md and parameters.md, and tables of formats.
+"""Tables that the code writes: docs/commands.md, python.md, parameters.md and formats.md.
 
 The parser names the commands, `md` its functions, the plugins' docstrings the parameters
 (`parameters`), and `info --formats` the formats.
@@ -22,27 +22,20 @@ from mitsuba_diffraction.settings import parameters_of
 from . import pages, parameters
 from .pages import option, program
 
-#: Commands by what they are for, in the order of the page.
+#: Commands by what they are for: the name of the page's part.
 GROUPS = {
-    "Measure a surface": ("info", "spectrum", "brdf-map", "survey", "scatter", "evaluate"),
-    "Render": ("render", "tonemap", "presets", "tangents", "hologram", "plan"),
-    "Tables and solved orders": ("precompute", "solve", "orders"),
-    "Other programs, real time": (
-        "view", "export-viewer", "export-shader", "export-osl", "export-bsdf",
-    ),
-    "Accuracy": ("tradeoff", "compare", "sweep"),
+    "measure": ("info", "spectrum", "brdf-map", "survey", "scatter", "evaluate"),
+    "render": ("render", "tonemap", "presets", "tangents", "hologram", "plan"),
+    "tables": ("precompute", "solve", "orders"),
+    "programs": ("view", "export-viewer", "export-shader", "export-osl", "export-bsdf"),
+    "accuracy": ("tradeoff", "compare", "sweep"),
 }  # fmt: skip
 
 
-def commands_page() -> str:
-    """Return the page of all commands."""
-    parsers = subparsers()
-    sections = [
-        "# Commands",
-        "`--help` behind the name of a command lists all options with defaults. Made by "
-        "`python -m docs.make.figures.interfaces -o docs`.",
-    ]
-    for title, names in GROUPS.items():
+def commands() -> dict[str, str]:
+    """Return the tables of all commands, and of the options for reading heights."""
+    parsers, parts = subparsers(), {}
+    for group, names in GROUPS.items():
         rows = [
             (
                 f"`{name}`",
@@ -51,7 +44,7 @@ def commands_page() -> str:
             )
             for name in names
         ]
-        sections += [f"## {title}", pages.table(("command", "arguments", "what it does"), rows)]
+        parts[group] = pages.table(("command", "arguments", "what it does"), rows)
     rows = [
         (
             f"`--{name.replace('_', '-')} {each.metavar}`",
@@ -59,19 +52,7 @@ def commands_page() -> str:
         )
         for name, each in parameters_of(LoadOptions).items()
     ]
-    sections += [
-        "## Options for reading heights",
-        "Commands that read height maps have these options. Recipes and scenes have parameters of "
-        "the same names.",
-        pages.table(("option", "meaning"), rows),
-        "## Ranges, files and exit codes",
-        "A range is `FIRST:LAST` or `FIRST:LAST:STEP`; commas separate values. Write `=` before a "
-        "negative value: `--angles=-60:75`. `--json FILE` writes the printed figures; spectra "
-        'there are fractions, `"unit": "1"`, and per cent in the CSV. Exit codes: '
-        "0 done, 1 failed, 2 wrong usage, 130 interrupted. No command replaces a file that it "
-        "reads, and none leaves a half-written file.",
-    ]
-    return "\n\n".join(sections) + "\n"
+    return parts | {"heights": pages.table(("option", "meaning"), rows)}
 
 
 def subparsers() -> dict[str, tuple[argparse.ArgumentParser, str]]:
@@ -96,21 +77,11 @@ def _arguments(parser: argparse.ArgumentParser) -> str:
     return f"`{' '.join(shown)}`" if shown else ""
 
 
-def python_page() -> str:
-    """Return the page of the public names of the package."""
+def names() -> dict[str, str]:
+    """Return the table of the public names of the package."""
     entries = _contents(md.__doc__ or "")
     rows = [(f"`md.{name}`", entries[name], _members(getattr(md, name))) for name in entries]
-    return "\n\n".join([
-        "# In Python",
-        "`import mitsuba_diffraction as md` imports heavy modules at their first use and registers "
-        "the plugins once Mitsuba is imported. `make site` builds a reference with all arguments. "
-        "Made by `python -m docs.make.figures.interfaces -o docs`.",
-        pages.table(("name", "what it is", "names in it"), rows),
-        "Lengths are in µm, wavelengths in nm, angles in degrees; directions are unit vectors that "
-        "point away from the surface. Every bad input is an `md.DiffractionError` of one line, "
-        "which `mi.load_dict` and `mi.load_file` turn into a `RuntimeError` that ends in it; "
-        "doubts are an `md.DiffractionWarning`.",
-    ]) + "\n"  # fmt: skip
+    return {"names": pages.table(("name", "what it is", "names in it"), rows)}
 
 
 def _contents(docstring: str) -> dict[str, str]:
@@ -136,8 +107,8 @@ def _members(value: object) -> str:
 _MOST = 10
 
 
-def format_tables() -> str:
-    """Return the tables of docs/formats.md with their titles as headings."""
+def formats() -> dict[str, str]:
+    """Return the tables of formats with their titles as headings."""
     parts = []
     for title, rows in sections().items():
         columns = [c for c in rows[0] if any(row[c] != "none" for row in rows)]
@@ -147,19 +118,20 @@ def format_tables() -> str:
             for r in rows
         ]
         parts += [f"## {title.capitalize()}", pages.table(tuple(columns), cells)]
-    return re.sub(r"(--[a-z][a-z-]+)", r"`\1`", "\n\n".join(part.strip() for part in parts))
+    text = "\n\n".join(part.strip() for part in parts)
+    return {"formats": re.sub(r"(--[a-z][a-z-]+)", r"`\1`", text)}
 
 
-#: Pages by the name of their file.
+#: Functions that return the parts of a page, by the name of its file.
 PAGES = {
-    "commands.md": commands_page, "python.md": python_page, "parameters.md": parameters.page,
+    "commands.md": commands, "python.md": names, "parameters.md": parameters.parts,
+    "formats.md": formats,
 }  # fmt: skip
 
 
 @program(option("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs")))
 def main(args: argparse.Namespace) -> None:
-    """Write the pages, and the tables into theirs."""
+    """Write the tables into their pages."""
     for name, made in PAGES.items():
-        pages.write_text(args.output / name, made())
+        pages.update(args.output / name, made())
         print(f"wrote {args.output / name}")
-    pages.update(args.output / "formats.md", {"formats": format_tables()})

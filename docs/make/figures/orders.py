@@ -42,13 +42,12 @@ class Scene:
     Attributes
     ----------
     name : of the scene's file and of the picture.
-    title : heading of the row.
+    title : of the row.
     surface : id of the BSDF of the grating.
     shape : id of the shape on which colours are compared.
     recipe : of heights with the table's profile, for the model.
     parameters : of the BSDF with the model.
     flags : size and samples.
-    difference : what a viewer sees.
     """
 
     name: str
@@ -58,7 +57,6 @@ class Scene:
     recipe: str
     parameters: str
     flags: tuple[str, ...]
-    difference: str
 
 
 _RECIPE = """generator = "{}"
@@ -73,31 +71,21 @@ SCENES = (
         "cd", "CD", "tracks", "data",
         _RECIPE.format("lamellar") + "period = 1.6\ndepth = 0.12\npixels_per_period = 64\n",
         "material=Al,coat_ior=1.58", ("resx=450", "resy=330", "spp=128"),
-        "Order 2, the green and violet fan behind the hole, is missing in the model, whose "
-        "grooves, half as wide as their period, have no even orders.",
     ),
     Scene(
         "grating", "blazed grating, 600 lines/mm, Al", "rulings", "grating", _BLAZED,
         "material=Al,orientation=-90", ("resx=420", "resy=330", "spp=256"),
-        "A viewer hardly sees a difference: hues follow from the grating equation.",
     ),
     Scene(
         "orders_on_wall", "the same grating before a wall", "rulings", "wall", _BLAZED,
         "material=Al", ("resx=450", "resy=210", "spp=512"),
-        "Order 1 on the right is alike. Weak orders on the left are too dark in the model, and its "
-        "order 0 is blue instead of pink.",
     ),
     Scene(
         "spectrometer", "clear grating, 600 lines/mm", "rulings", "screen",
         _RECIPE.format("sinusoidal") + "period = 1.6667\ndepth = 0.09\npixels_per_period = 24\n",
         "thin=true,int_ior=1.58", ("resx=420", "resy=240", "spp=160"),
-        "Order 2, faint at both ends, is 2 to 4 times as bright as in the model.",
     ),
 )  # fmt: skip
-_HOW = (
-    "ΔE2000 is that of blocks of {} pixels on the disc, grating, wall or screen, as a display "
-    "shows them. `python -m docs.make.figures.orders` makes pictures and table."
-)
 _HEADER = (
     "scene", "mean ΔE2000", "95th percentile", "processor time, solved / model",
 )  # fmt: skip
@@ -188,17 +176,13 @@ def _show(model: Rendered, solved: Rendered, difference: Real, target: Path) -> 
 def main(args: argparse.Namespace) -> None:
     """Render, write the pictures and the page."""
     images = args.output / "images/orders"
-    rows, shown = [], []
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
         for scene in SCENES:
             if args.only in (None, scene.name):
                 flags = ("resx=90", "resy=70", "spp=8") if args.quick else scene.flags
                 rows.append(row(scene, images, Path(folder), flags))
                 print("  ".join(rows[-1]), flush=True)
-            title = scene.title[0].upper() + scene.title[1:]
-            shown.append(f"![{title}: model, solved orders, difference]"
-                         f"(images/orders/{scene.name}.jpg)")  # fmt: skip
-            shown.append(f"{title}. {scene.difference}")
     if args.only is None:
-        page = "\n\n".join([*shown, pages.table(_HEADER, rows), _HOW.format(_BLOCK)])
-        pages.update(args.output / "orders.md", {"orders": page})
+        parts = {"orders": pages.table(_HEADER, rows), "block": f"{_BLOCK}"}
+        pages.update(args.output / "orders.md", parts)

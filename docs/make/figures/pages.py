@@ -1,7 +1,8 @@
 """Shared functions of the programs of this folder: parts of pages, JPEG, measurements, errors.
 
-Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end. Files that are
-missing, damaged or not writable are a DiffractionError, which a `program` prints in one line.
+Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end, on lines of their
+own or within a sentence. Files that are missing, damaged or not writable are a DiffractionError,
+which a `program` prints in one line.
 """
 
 from __future__ import annotations
@@ -44,8 +45,9 @@ class Seconds(NamedTuple):
 
 def replaced(text: str, name: str, content: str) -> str:
     """Return the text with the part of that name replaced between its markers."""
-    head, _, tail = _split(text, name)
-    return f"{head}\n{content.strip()}\n{tail}"
+    head, old, tail = _split(text, name)
+    around = "\n" if old.startswith("\n") else ""  # else the part is within a sentence
+    return f"{head}{around}{content.strip()}{around}{tail}"
 
 
 def part(text: str, name: str) -> str:
@@ -72,16 +74,6 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
         except DiffractionError as error:
             raise DiffractionError(f"'{file}': {error}") from error
     write_text(file, text)
-
-
-def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
-    """Replace the parts that a file has markers for."""
-    present = {name: parts[name] for name in markers(path) if name in parts}
-    if not present:
-        raise DiffractionError(
-            f"'{path}' has none of the markers {', '.join(f'<!-- begin {n} -->' for n in parts)}"
-        )
-    update(path, present)
 
 
 def markers(path: str | os.PathLike[str]) -> list[str]:

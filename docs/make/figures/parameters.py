@@ -26,12 +26,6 @@ PLUGINS = {
     "diffraction_mix": _FOLDER / "diffraction_mix.py",
 }
 
-_OTHERS = {
-    "diffraction_dielectric": "Other plugins: surfaces that transmit light",
-    "diffraction_orders": "gratings whose orders were solved",
-    "diffraction_mix": "several surfaces in one",
-}
-
 _GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
 _ENTRY = re.compile(
     r"^(?P<names>[\w(), ]+) : (?P<type>[^\[\n∂]+?)(?P<d> ∂)?(?: \[(?P<default>.+)\])?$"
@@ -83,26 +77,18 @@ def _entries(body: str) -> list[Parameter]:
     return entries
 
 
-def page() -> str:
-    """Return the reference of all plugins in Markdown."""
-    reflecting, *others = map(docstring, PLUGINS)
-    sections = [
-        "# Parameters of `diffraction`",
-        "Made by `make parameters` of the texts at the top of the plugins' modules. ∂: "
-        "differentiable, a parameter of `mi.traverse`. Lengths are in µm, wavelengths and "
-        "film_thickness in nm. In an image file the top row is the largest y. "
-        + ", ".join(
-            f"{what} [`{plugin}`](#parameters-of-{plugin})" for plugin, what in _OTHERS.items()
-        )
-        + ".",
-        *_parts(reflecting),
-        "[theory.md](theory.md) has the equations.",
-    ]
-    for plugin, text in zip(list(PLUGINS)[1:], others, strict=True):
+def parts() -> dict[str, str]:
+    """Return the reference of each plugin in Markdown."""
+    found = {}
+    for plugin in PLUGINS:
+        text = docstring(plugin)
         introduction = _GROUP.split(text)[0].partition("\n\n")[2]
-        *parts, _ = _parts(text)  # the example in Python has the same names
-        sections += [f"# Parameters of `{plugin}`", _prose(introduction), *parts]
-    return "\n\n".join(sections) + "\n"
+        *tables, example = _parts(text)
+        # the first plugin's introduction is the page's, and others' examples have its names
+        first = plugin == "diffraction"
+        shown = [*tables, example] if first else [_prose(introduction), *tables]
+        found[plugin] = "\n\n".join(shown)
+    return found
 
 
 def _parts(text: str) -> Iterator[str]:

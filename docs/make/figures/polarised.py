@@ -70,11 +70,5 @@ def main(args: argparse.Namespace) -> None:
             pages.run(*COMMAND, *option, "-o", file)
         table = OrderTable.load(files["Mueller matrices"])
         pages.write_figure(picture, figure(table), 110)
-        cost = costs(files)
-    caption = (
-        f"Unpolarised light from {_THETA:g}° on this grating, across the grooves. Left: "
-        "efficiency. Right: degree of polarisation of the order, above 0 along the grooves."
-    )
-    text = f"{caption}\n\n![efficiency and polarisation](images/orders/{_NAME}.jpg)\n\n{cost}"
-    text += "\n\n`python -m docs.make.figures.polarised` makes the figure and the table."
-    pages.update(args.output / "orders.md", {_NAME: text})
+        parts = {_NAME: costs(files), "light": f"{_THETA:g}°"}
+    pages.update(args.output / "orders.md", parts)

@@ -63,6 +63,5 @@ def _missed(solver: IntegralSolver, case: Case) -> float:
 def main(args: argparse.Namespace) -> None:
     """Write the table of the page."""
     header = ("sinusoidal sheet of index 1.58", *(f"{theta:g}°" for theta in _THETAS))
-    text = pages.table(header, [row(sheet) for sheet in SHEETS])
-    text += "\n\n`python -m docs.make.figures.sheets` makes this table."
-    pages.update(args.output / "orders.md", {"sheets": text})
+    table = pages.table(header, [row(sheet) for sheet in SHEETS])
+    pages.update(args.output / "orders.md", {"sheets": table})

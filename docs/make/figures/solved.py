@@ -17,10 +17,6 @@ _FOLDER = Path("precompute/orders")
 _HEADER = (
     "table", "solver", "MB", "processor minutes", "error, mean", "in 95 %", "reciprocity",
 )  # fmt: skip
-_HOW = (
-    "Processor time is that of all solutions, those for the choice of nodes included. "
-    "`python -m docs.make.figures.solved` makes the table, from the headers."
-)
 
 
 def row(file: Path) -> tuple[str, ...]:
@@ -37,13 +33,12 @@ def row(file: Path) -> tuple[str, ...]:
     )
 
 
-def text() -> str:
+def table() -> str:
     """Return the part of the page."""
-    rows = [row(file) for file in sorted(_FOLDER.glob("*.nc"))]
-    return f"{pages.table(_HEADER, rows)}\n\n{_HOW}"
+    return pages.table(_HEADER, [row(file) for file in sorted(_FOLDER.glob("*.nc"))])
 
 
 @program(option("-o", "--output", type=Path, default=Path("docs"), help="of the page"))
 def main(args: argparse.Namespace) -> None:
     """Write the table."""
-    pages.update(args.output / "orders.md", {"solved": text()})
+    pages.update(args.output / "orders.md", {"solved": table()})

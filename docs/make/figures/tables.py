@@ -258,20 +258,20 @@ class Part:
 
     # Markdown by the name of its markers, from a document and the name of its file
     tables: Callable[[dict[str, Any], str], dict[str, str]]
-    pages: tuple[str, ...]  # those that have the markers
+    page: str  # that has the markers
     writer: str  # the command that writes such documents
     remedy: str  # what to do about another file
     pictures: tuple[str, ...] = ()  # that lie beside a document named as the part is, in a folder
 
 
 PARTS = {
-    "speed": Part(speed, ("docs/performance.md",), "docs.make.bench --json", "run make bench"),
-    "card": Part(graphics_card, ("docs/performance.md",), "docs.make.bench --json",
+    "speed": Part(speed, "docs/performance.md", "docs.make.bench --json", "run make bench"),
+    "card": Part(graphics_card, "docs/performance.md", "docs.make.bench --json",
                  "run make bench-gpu"),
-    "tradeoff": Part(tradeoff, ("docs/accuracy.md",), "tradeoff", "run make tradeoff",
+    "tradeoff": Part(tradeoff, "docs/accuracy.md", "tradeoff", "run make tradeoff",
                      ("tradeoff.png", "depth.png")),
-    "plan": Part(plan, ("docs/performance.md",), "plan --json", "run make plan"),
-    "energy": Part(energy, ("docs/energy.md",), "info --energy --json", "run make energy"),
+    "plan": Part(plan, "docs/performance.md", "plan --json", "run make plan"),
+    "energy": Part(energy, "docs/energy.md", "info --energy --json", "run make energy"),
 }  # fmt: skip
 
 
@@ -282,14 +282,11 @@ _LONG = ("tradeoff", "energy")
 @program(
     option("part", choices=tuple(PARTS)),
     option("measured", metavar="FILE", type=Path, nargs="+", help="JSON, or a folder"),
-    option(
-        "-o", "--output", metavar="FILE", type=Path, nargs="+",
-        help="pages, each with some of the markers; default: those in docs",
-    ),
+    option("-o", "--output", metavar="FILE", type=Path, help="page; default: the one in docs"),
     option("--images", metavar="FOLDER", type=Path, default=Path("docs/images")),
 )  # fmt: skip
 def main(args: argparse.Namespace) -> None:
-    """Write the tables of one part into its pages."""
+    """Write the tables of one part into its page."""
     part = PARTS[args.part]
     texts: dict[str, str] = {}
     for measurement in args.measured:
@@ -300,10 +297,8 @@ def main(args: argparse.Namespace) -> None:
         for name, text in parts.items():  # a table goes on with the rows of the next file
             rows = text.split("\n", 2)[-1]
             texts[name] = f"{texts[name]}\n{rows}" if name in texts else text
-    for page in args.output or map(Path, part.pages):
-        pages.update_present(page, texts)
-        if args.part in _LONG:
-            long_tables.write_page(Path(page), Path(page).read_text(encoding="utf-8"))
+    update = long_tables.update if args.part in _LONG else pages.update
+    update(args.output or Path(part.page), texts)
     for name in part.pictures:
         with atomic_path(args.images / name) as temporary:
             shutil.copyfile(args.measured[0] / name, temporary)

@@ -8,5 +8,5 @@ predict     orders of one mount by the model and by a solver
 cases       measured gratings: efficiencies, printed properties, fitted grooves
 shapes      effect of each imperfection of a groove on its orders
 outside     height maps and pictures of another wave-optics renderer
-page        tables and figures; page.txt has the words
+page        parts of the page, and its figure
 """

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from docs.make.figures.long_tables import write_page
+from docs.make.figures.long_tables import update
 from docs.make.figures.pages import option, program, write_figure
 from mitsuba_diffraction.cli import check_outputs
 from mitsuba_diffraction.errors import DiffractionError
@@ -32,12 +32,10 @@ def main(args: argparse.Namespace) -> None:
         raise DiffractionError(
             f"--kaist: '{args.kaist}' has no folder 'output'; clone {outside.REPOSITORY}"
         )
-    for path in (written, picture):
-        check_outputs([path], make_folder=True)
-        path.parent.mkdir(parents=True, exist_ok=True)
+    check_outputs([written, picture])
     if args.fit:
         cases.write_fits()
     found = page.Comparisons(args.kaist, quick=args.quick)
     write_figure(picture, page.figure(found), 100)
-    write_page(written, page.write(found) + "\n")
+    update(written, page.parts(found))
     print(f"wrote {written}\nREADME: {page.summary(found)}")

@@ -1,4 +1,4 @@
-"""Text and figures of docs/validation/measured.md."""
+"""Parts and figure of docs/validation/measured.md."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from .grooves import Groove
 
 # three colours that keep apart in grey and for colour-blind readers
 _STYLES = {"modelled": ("#d55e00", "--"), "solved": ("#0072b2", "-")}
-_TEMPLATE = Path(__file__).with_name("page.txt")
 _PEAKS = np.arange(520.0, 881.0, 20.0)
 
 
@@ -28,7 +27,7 @@ class Comparisons:
 
     Parameters
     ----------
-    clone : of `outside.REPOSITORY`; None leaves its section out.
+    clone : of `outside.REPOSITORY`; None leaves its part of the page as it is.
     quick : one grating of each kind, for tests.
     """
 
@@ -54,11 +53,6 @@ class Comparisons:
         silver = predict.mirror_reflectance("Ag", _PEAKS)
         solved, modelled = predict.normal_pair(profile, "Ag", _PEAKS)
         return solved / silver, modelled / silver
-
-    @cached_property
-    def pictures(self) -> list[outside.Picture]:
-        """Pictures of another renderer."""
-        return outside.compare(self.clone) if self.clone else []
 
     @cached_property
     def effects(self) -> dict[str, tuple[shapes.Effect | None, shapes.Effect | None]]:
@@ -140,39 +134,36 @@ def summary(found: Comparisons) -> str:
     )
 
 
-def write(found: Comparisons) -> str:
-    """Return the page."""
+def parts(found: Comparisons) -> dict[str, str]:
+    """Return the parts of the page by name, without a clone all but the other renderer's."""
     solved, modelled = found.pair
     peak = int(solved.argmax())
-    ronchi = cases.table("ronchi400")["efficiency"].mean()
-    mask = predict.face(cases.GLASS) ** 2 / np.pi**2
+    ronchi = points(cases.table("ronchi400")["efficiency"].mean())
+    mask = points(predict.face(cases.GLASS) ** 2 / np.pi**2)
     bench = [case for case in found.blazed if case.laboratory == "LPNHE"]
     fitted = [case.grooves[cases.FITS[-1]] for case in bench]
+    apices = " or ".join(f"{groove.apex:.0f}°" for groove in fitted)
+    roughnesses = " or ".join(f"{groove.roughness:.0f} nm" for groove in fitted)
     walls = bench[0].drawing._replace(apex=90.0 - bench[0].drawing.facet)
     steep = next(case for case in found.gratings if "1200" in case.name)
-    words = _TEMPLATE.read_text(encoding="utf-8").rstrip()
-    return words.format(
-        summary=summary(found),
-        table=_table(found),
-        grooves=_grooves(found),
-        effects=_effects(found),
-        pictures=_pictures(found),
-        repository=outside.REPOSITORY,
-        solved_peak=f"{100 * solved[peak]:.0f}",
-        solved_place=f"{_PEAKS[peak]:.0f}",
-        model_peak=f"{100 * modelled.max():.0f}",
-        ronchi=points(ronchi),
-        mask=points(mask),
-        factors=_factors(bench, bench[0].drawing),
-        walls=_factors(bench, walls),
-        apices=" or ".join(f"{groove.apex:.0f}°" for groove in fitted),
-        roughnesses=" or ".join(f"{groove.roughness:.0f} nm" for groove in fitted),
-        steep_model=points(steep.deviation("modelled", cases.FITS[-1])),
-        steep_solved=points(steep.deviation("solved", cases.FITS[-1])),
-        face=f"{predict.face(cases.GLASS):.3f}",
-        reflected=f"{100 * found.solvers[0]:.2f}",
-        through=f"{100 * found.solvers[1]:.2f}",
-    )
+    return {
+        "summary": f"{summary(found)}.",
+        "agreement-with-measurements": _table(found),
+        "steep-model": points(steep.deviation("modelled", cases.FITS[-1])),
+        "steep-solved": points(steep.deviation("solved", cases.FITS[-1])),
+        "silver": f"{100 * solved[peak]:.0f} % at {_PEAKS[peak]:.0f} nm. The model: "
+        f"{100 * modelled.max():.0f} %",
+        "what-was-fitted": _grooves(found),
+        "factors": _factors(bench, bench[0].drawing),
+        "walls": _factors(bench, walls),
+        "ronchi": f"{ronchi} %, an ideal one between two faces of glass {mask} %",
+        "face": f"{predict.face(cases.GLASS):.3f}",
+        "groove": f"{apices} and {roughnesses}",
+        "a-real-groove-is-not-its-drawing": _effects(found),
+        **_pictures(found),
+        "reflected": f"{100 * found.solvers[0]:.2f}",
+        "through": f"{100 * found.solvers[1]:.2f}",
+    }
 
 
 def _factors(bench: list[Case], groove: Groove) -> str:
@@ -226,14 +217,12 @@ def _effects(found: Comparisons) -> str:
     return table(["flaw", "aluminium, 600/mm, 9.4°", "glass, 300/mm, 17.5°"], rows)
 
 
-def _pictures(found: Comparisons) -> str:
-    if not found.pictures:
-        return (
-            f"This section needs a clone of [the repository]({outside.REPOSITORY}), which may not "
-            "be redistributed: `make measured KAIST=FOLDER`."
-        )
+def _pictures(found: Comparisons) -> dict[str, str]:
+    if not found.clone:
+        return {}
     rows = [
         [p.name, f"{p.correlation:.4f}", f"{p.factor:.2f}", f"{100 * p.deviation:.1f} %"]
-        for p in found.pictures
+        for p in outside.compare(found.clone)
     ]
-    return table(["height map", "correlation", "theirs over ours", "mean deviation"], rows)
+    header = ["height map", "correlation", "theirs over ours", "mean deviation"]
+    return {"pictures": table(header, rows)}

@@ -106,7 +106,7 @@ def test_a_measured_patch_replaces_the_default(tmp_path, capsys):
 
 def test_a_missed_goal_is_said():
     rows = [Row("a", {"s": 5.0}, [Goal("at most 4 s", False)]), Row("b", {"s": None})]
-    lines = list(Section("title", ["s"], rows).lines())
+    lines = list(Section("title", rows).lines())
     assert lines[2].split() == ["a", "5.00", "at", "most", "4", "s:", "MISSED"]
     assert lines[3].strip() == "b"
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -13,8 +11,8 @@ from docs.make.figures.pages import write_jpeg
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of
-from scenes.make.__main__ import build_parser as meshes_parser
 from tests.support import ROOT
+from tests.support.pages import PAGES
 
 DOCS = ROOT / "docs"
 
@@ -32,23 +30,24 @@ SCENE = """<scene version="3.0.0">
 """
 
 
-@pytest.mark.parametrize("picture", gallery.PICTURES, ids=lambda p: p.name)
-def test_its_commands_fit_the_program_and_the_scene(picture):
-    for command in picture.commands:
-        words = shlex.split(command)
-        if words[0] == "meshes":
-            meshes_parser().parse_args(words[1:])
-            continue
-        args = build_parser().parse_args(words)
-        if words[0] == "render":
-            known = parameters_of(ROOT / args.scene)
-            assert known is not None
-            assert {name for name, _ in args.parameters} <= set(known)
-            assert set(args.turn) <= set(known)
+PICTURES = [
+    picture for page in gallery.PAGES for picture in gallery.pictures(PAGES[f"docs/{page}"])
+]
+pictures = pytest.mark.parametrize("picture", PICTURES, ids=lambda p: p.file.stem)
+
+
+@pictures
+def test_its_commands_turn_what_the_scene_has(picture):
+    program, *words = picture.commands[-1]
+    assert program.endswith("mitsuba-diffraction")
+    args = build_parser().parse_args(words)
+    known = parameters_of(ROOT / args.scene)
+    assert known is not None
+    assert {name for name, _ in args.parameters} | set(args.turn) <= set(known)
 
 
 def test_every_scene_is_shown():
-    shown = {shlex.split(p.commands[-1])[1] for p in gallery.PICTURES if p.page == "gallery"}
+    shown = {picture.commands[-1][2] for picture in PICTURES}
     # for the others to include, and one that needs no picture: docs/meshes.md works with it
     parts = {"from_blender", "daylight", "lamp", "room", "skin", "skin_two", "studio", "window"}
     parts |= {"environment", "outdoors", "label", "ring"}
@@ -56,7 +55,7 @@ def test_every_scene_is_shown():
     assert shown == {f"scenes/{name}.xml" for name in scenes}
 
 
-@pytest.mark.parametrize("picture", gallery.PICTURES, ids=lambda p: p.name)
+@pictures
 def test_pictures_are_there_and_small(picture):
     file = DOCS / picture.file
     assert 2_000 < file.stat().st_size <= 250_000
@@ -65,30 +64,42 @@ def test_pictures_are_there_and_small(picture):
 
 
 @pytest.fixture
-def stand_in(tmp_path):
-    """A folder with a scene, and a picture of it."""
-    (tmp_path / "room.xml").write_text(SCENE)
+def stand_in(tmp_path, monkeypatch):
+    """A folder with a scene, and what its page shows with some words behind `render`."""
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes/room.xml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
 
-    def picture(*commands):
-        return gallery.Picture("page", "room", "Room", "A room.", commands)
+    def picture(command):
+        text = f"![](images/gallery/room.jpg)\n\nA room.\n\n```sh\n{command}\n```\n\n## Next\n"
+        (found,) = gallery.pictures(text)
+        return found
 
-    return tmp_path, picture
+    return picture
 
 
-def test_a_picture_is_made_by_its_commands(stand_in, capsys):
-    folder, picture = stand_in
-    made = picture("render scenes/room.xml -m scalar_rgb -D light=0.2 -s 1 -o out/room.png")
-    gallery.make(made, folder / "room.jpg", folder)
-    with Image.open(folder / "room.jpg") as image:
+def test_a_picture_is_made_by_its_commands(stand_in, tmp_path, capsys):
+    made = stand_in(
+        "mitsuba-diffraction render scenes/room.xml -m scalar_rgb -D light=0.2 \\\n"
+        "    -s 1 -o out/room.png"
+    )
+    gallery.make(made, tmp_path / "room.jpg")
+    with Image.open(tmp_path / "room.jpg") as image:
         assert image.size == (24, 16)
         assert np.asarray(image).mean() == pytest.approx(124, abs=2)  # 0.2 in sRGB bytes
     assert capsys.readouterr().out == ""
 
 
-def test_a_command_that_fails_is_named(stand_in):
-    folder, picture = stand_in
-    with pytest.raises(DiffractionError, match=r"room: 'render scenes/none.xml .*' failed"):
-        gallery.make(picture("render scenes/none.xml -o out/a.png"), folder / "a.jpg", folder)
+def test_a_command_that_fails_is_named(stand_in, tmp_path):
+    made = stand_in("mitsuba-diffraction render scenes/none.xml -o out/a.png")
+    with pytest.raises(DiffractionError, match=r"'render scenes/none.xml .*' failed"):
+        gallery.make(made, tmp_path / "a.jpg")
+
+
+def test_a_picture_without_commands_shows_the_scene_of_its_name():
+    (found,) = gallery.pictures("## A room\n\n![](images/gallery/room.jpg)\n\nA room.\n")
+    words = "mitsuba-diffraction render scenes/room.xml -o out/room.png"
+    assert found.commands == (tuple(words.split()),)
 
 
 def test_quality_gives_way_to_size(tmp_path):

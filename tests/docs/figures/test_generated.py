@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from docs.make.figures import interfaces, pages, solved
-from docs.make.figures.long_tables import LONG, write_page
+from docs.make.figures import interfaces, long_tables, pages, solved
+from docs.make.figures.long_tables import LONG
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights.formats.catalogue import ARRAYS, OPTICAL, PROBES
 from tests.support import ROOT
@@ -16,18 +16,17 @@ from tests.support.pages import PAGES
 
 
 @pytest.mark.parametrize("page", interfaces.PAGES)
-def test_the_page_is_what_the_code_says(page):
+def test_the_page_has_what_the_code_says(page):
     remedy = "python -m docs.make.figures.interfaces -o docs"
-    assert PAGES[f"docs/{page}"] == interfaces.PAGES[page](), remedy
+    made = interfaces.PAGES[page]()
+    assert pages.markers(ROOT / "docs" / page) == list(made)
+    for name, text in made.items():
+        assert pages.part(PAGES[f"docs/{page}"], name) == text, remedy
 
 
 def test_every_command_has_a_place():
     grouped = {name for names in interfaces.GROUPS.values() for name in names}
     assert grouped == set(interfaces.subparsers())
-
-
-def test_the_page_has_the_tables_of_formats():
-    assert pages.part(PAGES["docs/formats.md"], "formats") == interfaces.format_tables()
 
 
 def test_listed_suffixes_are_of_formats_that_the_library_reads():
@@ -48,7 +47,7 @@ def test_the_page_has_the_numbers_of_the_shipped_tables(monkeypatch):
         rows = (line for line in text.splitlines() if line.startswith("|"))
         return [number for row in rows for number in re.findall(r"\d+(?:\.\d+)?", row)]
 
-    made = numbers(solved.text())
+    made = numbers(solved.table())
     assert len(made) > 20
     assert numbers(pages.part(PAGES["docs/orders.md"], "solved")) == made
 
@@ -62,36 +61,39 @@ def test_a_part_is_replaced_and_all_else_stays():
         pages.replaced(text + text, "t", "new")
 
 
-def page_of(rows):
+def table_of(rows):
     lines = "".join(f"| `case {n}` | {n} % | \\|a\\| |\n" for n in range(rows))
-    return f"# Page\n\n## By depth\n\n| case | error | a |\n|---|---:|---|\n{lines}\nEnd.\n"
+    return f"| case | error | a |\n|---|---:|---|\n{lines}"
 
 
-def test_a_long_table_is_a_file_with_the_same_cells(tmp_path):
-    (tmp_path / "page-old.csv").write_text("of an earlier page")
-    written = write_page(tmp_path / "page.md", page_of(LONG))
-    assert [path.name for path in written] == ["page.md", "page-by-depth.csv"]
-    text = (tmp_path / "page.md").read_text(encoding="utf-8")
-    assert f"[Table of {LONG} rows](page-by-depth.csv): case, error, a." in text
+@pytest.fixture
+def page(tmp_path):
+    """A page with a long table that is written by hand, and an empty part."""
+    file = tmp_path / "page.md"
+    part = "<!-- begin by-depth -->\n<!-- end by-depth -->\n"
+    file.write_text(f"# Page\n\n{table_of(LONG)}\n{part}\nEnd.\n", encoding="utf-8")
+    return file
+
+
+def test_a_long_table_is_a_file_with_the_same_cells(page):
+    old = page.with_name("page-old.csv")
+    old.write_text("of an earlier page")
+    long_tables.update(page, {"by-depth": f"Before.\n\n{table_of(LONG)}\nBehind."})
+    text = page.read_text(encoding="utf-8")
+    link = f"[Table of {LONG} rows](page-by-depth.csv): case, error, a."
+    assert pages.part(text, "by-depth") == f"Before.\n\n{link}\n\nBehind."
+    # written by hand
+    assert text.startswith(f"# Page\n\n{table_of(LONG)}\n")
     assert text.endswith("\nEnd.\n")
-    with (tmp_path / "page-by-depth.csv").open(encoding="utf-8") as stream:
+    with page.with_name("page-by-depth.csv").open(encoding="utf-8") as stream:
         rows = list(csv.reader(stream))
     assert rows[0] == ["case", "error", "a"]
     assert rows[1:] == [[f"case {n}", f"{n} %", "|a|"] for n in range(LONG)]
-    assert not (tmp_path / "page-old.csv").exists()
+    assert not old.exists()
 
 
-def test_a_short_table_stays(tmp_path):
-    text = page_of(LONG - 1)
-    assert write_page(tmp_path / "page.md", text) == [tmp_path / "page.md"]
-    assert (tmp_path / "page.md").read_text(encoding="utf-8") == text
-
-
-def test_a_table_outside_of_the_generated_parts_stays(tmp_path):
-    by_hand, made = page_of(LONG), page_of(LONG).replace("case", "row")
-    text = f"{by_hand}<!-- begin figures -->\n{made}<!-- end figures -->\n{by_hand}"
-    assert len(write_page(tmp_path / "page.md", text)) == 2
-    shown = (tmp_path / "page.md").read_text(encoding="utf-8")
-    assert shown.count(by_hand) == 2
-    assert "Table of" in shown
-    assert "| `row 0`" not in shown
+def test_a_short_table_stays(page):
+    table = table_of(LONG - 1)
+    long_tables.update(page, {"by-depth": table})
+    assert pages.part(page.read_text(encoding="utf-8"), "by-depth") == table.strip()
+    assert list(page.parent.iterdir()) == [page]

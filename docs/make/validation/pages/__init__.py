@@ -1,4 +1,4 @@
-"""Writers of docs/validation.md and of the pages in docs/validation/.
+"""Writers of the parts of docs/validation.md and of the pages in docs/validation/.
 
 Contents
 --------

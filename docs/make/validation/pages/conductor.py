@@ -1,6 +1,8 @@
-"""docs/validation/conductor.md: gratings of a perfect conductor."""
+"""Parts of docs/validation/conductor.md: gratings of a perfect conductor."""
 
 from __future__ import annotations
+
+from functools import partial
 
 from ..cases import PROBE_GRATING, Grating
 from ..compare import Comparison, angles_of, table_of
@@ -8,24 +10,16 @@ from .markdown import angle, percent, table
 from .measurements import Measurements
 
 
-def write(measured: Measurements) -> str:
-    """Write the page."""
-    return f"""# Gratings of a perfect conductor
-
-`material="none"` uses Kirchhoff's model without polarisation.
-
-{_probe(measured)}
-
-{_polarisation(measured)}"""
-
-
-def _probe(measured: Measurements) -> str:
+def parts(measured: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
     grating = Grating(*PROBE_GRATING)
     part = measured.perfect.where(grating=grating)
-    straight = part.where(theta=0.0)
-    wavelengths = sorted({solved.case.light.wavelength for solved in straight.solved})
-    to_550 = max(_relative(straight, w) for w in wavelengths if w <= 550)
-    from_450 = max(_relative(straight, w) for w in wavelengths if w >= 450)
+    straight = {
+        each.solved[0].case.light.wavelength: each.largest_relative()
+        for each in part.where(theta=0.0).each()
+    }
+    to_550 = max(error for lam, error in straight.items() if lam <= 550)
+    from_450 = max(error for lam, error in straight.items() if lam >= 450)
     rows = []
     for theta in angles_of(part):
         at = part.where(theta=theta)
@@ -34,34 +28,23 @@ def _probe(measured: Measurements) -> str:
     header = [
         "incidence", "largest relative, orders −2 to 2", "deviation", "of colours", "light gained",
     ]  # fmt: skip
-    return f"""## A gentle sinusoid
-
-Period {grating.period:g} µm, depth {grating.depth:g} µm, RMS slope {grating.field.rms_slope:.3f},
-unpolarised light. At normal incidence the relative error of the orders −2 to 2 is at most
-{percent(to_550)} up to 550 nm, and {percent(from_450)} from 450 to {wavelengths[-1]:g} nm.
-
-{table(header, rows)}
-
-![Efficiencies of three gratings against wavelength](../images/validation_orders.png)"""
-
-
-def _relative(part: Comparison, wavelength: float) -> float:
-    return part.where(wavelength=wavelength).largest_relative()
+    return {
+        "grating": f"{grating.period:g} µm, depth {grating.depth:g} µm, RMS slope "
+        f"{grating.field.rms_slope:.3f}",
+        "error": f"{percent(to_550)} up to 550 nm, and {percent(from_450)} from 450 to "
+        f"{max(straight):g} nm",
+        "a-gentle-sinusoid": table(header, rows),
+        "polarised-light": _polarised(measured.perfect.where(profile="sinusoidal")),
+    }
 
 
-def _polarisation(measured: Measurements) -> str:
-    sinusoids = measured.perfect.where(profile="sinusoidal")
+def _polarised(sinusoids: Comparison) -> str:
     angles = angles_of(sinusoids)
     rows = []
     for period, depth in ((5.0, 0.1), PROBE_GRATING[1:], (1.6, 0.2), (1.1, 0.4)):
         grating = Grating("sinusoidal", period, depth)
         for light in ("te", "tm"):
-            values = table_of(
-                sinusoids, [grating], angles, lambda part, light=light: part.deviation(light=light)
-            )[0]
+            measure = partial(Comparison.deviation, light=light)
+            values = table_of(sinusoids, [grating], angles, measure)[0]
             rows.append([str(grating), light.upper(), *map(percent, values)])
-    return f"""## Polarised light
-
-Deviation of all orders of the unpolarised model from each polarisation:
-
-{table(["grating", "light", *map(angle, angles)], rows)}"""
+    return table(["grating", "light", *map(angle, angles)], rows)

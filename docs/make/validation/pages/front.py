@@ -1,4 +1,4 @@
-"""docs/validation.md: the figures that users decide by."""
+"""Parts of docs/validation.md: the figures that users decide by."""
 
 from __future__ import annotations
 
@@ -25,49 +25,21 @@ _CELLS = (
 _LOW = 0.08
 
 
-def write(measured: Measurements) -> str:
-    """Write the page."""
-    parts = [_surfaces(measured), _layers(measured), _numerics(), _tables()]
-    return "\n\n".join(parts)
-
-
-def _surfaces(measured: Measurements) -> str:
-    rows = [*_gratings(measured), *_cells(measured)]
+def parts(measured: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
     header = ["surface", "cases", "Kirchhoff, 60°", "default, 60°", "0°", "30°"]
-    return f"""# How far the model holds
-
-`make validation` compares the model with rigorous solutions, closed forms and statistics, and
-writes these pages.
-
-- Gentle surfaces: up to an RMS slope of {GENTLE_SLOPE:g} colours deviate by less than
-  {percent(GENTLE_ERROR)}, up to {STEEP_SLOPE:g} by less than {percent(STEEP_ERROR)}, in light up to
-  {STEEPEST_LIGHT:g}° from the normal. The package warns beyond both slopes.
-- Vertical walls deviate more at any depth, most of all on metals and in oblique light. For
-  periodic grooves, [solved orders](validation/orders.md) have no such error.
-- `model="small_slope"`, the default, is better than `model="kirchhoff"`, most of all in oblique
-  light and in polarised light.
-- The model ignores light that is diffracted twice. The error is largest where all structures are
-  alike and light is oblique, as on the pits of a dielectric disc.
-
-## Deviation by surface
-
-Mean and worst case for light from 60°; mean of the default for 0° and 30°.
-
-{table(header, rows)}
-
-![Deviation of sinusoids against RMS slope](images/validation_slopes.png)
-
-### What the figures are
-
-The deviation of *colours* is a sum over wavelengths and over the diffracted orders within
-{GRAZING:g}° of the normal:
-
-$$
-\\frac{{\\sum |\\eta - \\eta_{{\\mathrm{{rigorous}}}}|}}{{\\sum \\eta_{{\\mathrm{{rigorous}}}}}} ,
-$$
-
-where η is the power of an order for unpolarised light, before energy is conserved. The index of
-keratin is 1.56. Light is incident across the grooves of gratings."""
+    gentle = gratings_of(measured.coats[0], "sinusoidal")
+    tables = (table_of(part, gentle, ANGLES, of_colours) for part in measured.coats)
+    passage, bounced = (percent(float(values.max())) for values in tables)
+    return {
+        "slopes": f"up to an RMS slope of {GENTLE_SLOPE:g} colours deviate by less than "
+        f"{percent(GENTLE_ERROR)}, up to {STEEP_SLOPE:g} by less than {percent(STEEP_ERROR)}, in "
+        f"light up to {STEEPEST_LIGHT:g}°",
+        "deviation": table(header, [*_gratings(measured), *_cells(measured)]),
+        "grazing": f"{GRAZING:g}°",
+        "coat": f"{passage} for light diffracted once, {bounced} with bounces",
+        "film": percent(measured.worst_under_films),
+    }
 
 
 def _gratings(measured: Measurements) -> list[list[object]]:
@@ -116,38 +88,3 @@ def _cells(measured: Measurements) -> list[list[object]]:
 
 def _mean_and_worst(values: np.ndarray) -> str:
     return f"{percent(float(np.nanmean(values)))}, {percent(float(np.nanmax(values)))}"
-
-
-def _layers(measured: Measurements) -> str:
-    gentle = gratings_of(measured.coats[0], "sinusoidal")
-    tables = (table_of(part, gentle, ANGLES, of_colours) for part in measured.coats)
-    passage, bounced = (percent(float(values.max())) for values in tables)
-    return f"""## Coats, films, transmitted light
-
-Largest deviation of colours in light up to 60°:
-
-- coat on sinusoids of aluminium: {passage} for light diffracted once, {bounced} with bounces.
-- film of up to 700 nm on slopes up to 0.1: {percent(measured.worst_under_films)}."""
-
-
-def _numerics() -> str:
-    return """## Numerical errors
-
-Order powers of ideal gratings agree with closed forms to 5e-6 in `md.reference.brdf` and to 1e-5 in
-tables. The rigorous solutions change by less than 5e-3 of the incident light in their last
-refinement, most by 1e-5."""
-
-
-def _tables() -> str:
-    return """## The tables
-
-- [Gratings](validation/gratings.md) by slope, depth, profile and polarisation, with our goals
-- [Surfaces](validation/surfaces.md): crossed gratings, scales and discs, in any plane of incidence
-- [Coats and films](validation/layers.md)
-- [Transmission](validation/transmission.md): interfaces and thin sheets, and R + T
-- [Solved orders](validation/orders.md) beside other solvers and published figures
-- [Measured gratings](validation/measured.md) beside the model and solved orders
-- [Perfect conductor](validation/conductor.md)
-- [Closed forms and random surfaces](validation/numerics.md)
-- [Rigorous solutions](validation/solutions.md) and their convergence
-- [Scans](validation/scans.md): hues of gratings, and crops of a rough surface"""

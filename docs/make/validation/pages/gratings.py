@@ -1,4 +1,4 @@
-"""docs/validation/gratings.md: gratings of keratin and aluminium."""
+"""Parts of docs/validation/gratings.md: gratings of keratin and aluminium."""
 
 from __future__ import annotations
 
@@ -15,36 +15,19 @@ from .markdown import angle, beside, both_models, percent, table
 from .measurements import Measurements
 
 
-def write(measured: Measurements) -> str:
-    """Write the page."""
-    parts = [_introduction(), _bands(measured), _slopes(measured), _edges(measured)]
-    return "\n\n".join([*parts, _aluminium(measured), _goals(measured)])
-
-
-def _introduction() -> str:
-    return """# Gratings of keratin and aluminium
-
-Deviation of colours of three models from rigorous solutions
-([method](solutions.md), [definition](../validation.md#what-the-figures-are)):
-
-- *Kirchhoff*: `model="kirchhoff"`.
-- *Small slope*: first-order small slope alone, which the plugin does not offer.
-- *Blend*: `model="small_slope"`.
-
-Light is incident across the grooves."""
-
-
-def _bands(measured: Measurements) -> str:
-    return f"""## By depth and profile
-
-Mean over the gratings, as Kirchhoff / small slope / blend.
-
-{_banded(measured, models.COMPARED, {"": models.of_colours})}
-
-For one polarisation, whose errors partly cancel in unpolarised light, as Kirchhoff / blend (TE: the
-electric field along the grooves):
-
-{_banded(measured, models.BOTH, {"TE ": models.of_te, "TM ": models.of_tm})}"""
+def parts(measured: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
+    by_light = {"TE ": models.of_te, "TM ": models.of_tm}
+    return {
+        "by-depth-and-profile": _banded(measured, models.COMPARED, {"": models.of_colours}),
+        "by-depth-and-profile-2": _banded(measured, models.BOTH, by_light),
+        **_slopes(measured),
+        "walls": _edges(measured, "lamellar"),
+        "walls-2": _edges(measured, "blazed"),
+        **_aluminium(measured),
+        "goals": _goals(measured),
+        "worse": f"{len(goals.much_worse(measured.gratings['keratin']))}",
+    }
 
 
 def _banded(
@@ -67,7 +50,7 @@ def _banded(
     return table(["grating", "depth/period", *header], rows)
 
 
-def _slopes(measured: Measurements) -> str:
+def _slopes(measured: Measurements) -> dict[str, str]:
     rows = [
         [
             f"{material}, {grating.period:g}/{grating.depth:g} µm",
@@ -80,44 +63,30 @@ def _slopes(measured: Measurements) -> str:
         )
     ]
     header = ["sinusoid", "RMS slope", *map(angle, models.ANGLES)]
-    parts = list(measured.default.values())
-    gentle, steep = (slope_limit(parts, error) for error in (GENTLE_ERROR, STEEP_ERROR))
-    return f"""## Sinusoids by slope
-
-Period/depth, Kirchhoff / blend:
-
-{table(header, rows)}
-
-The package warns beyond {GENTLE_SLOPE:g} and {STEEP_SLOPE:g}. Up to {gentle:.3f} and {steep:.3f}
-no sinusoid of either material exceeds {percent(GENTLE_ERROR)} and {percent(STEEP_ERROR)}
-in light up to {STEEPEST_LIGHT:g}° from the normal. The RMS slope of steps depends on the pixel, so
-it says little about blazed and lamellar gratings."""
+    sides = list(measured.default.values())
+    gentle, steep = (slope_limit(sides, error) for error in (GENTLE_ERROR, STEEP_ERROR))
+    return {
+        "sinusoids-by-slope": table(header, rows),
+        "warned": f"{GENTLE_SLOPE:g} and {STEEP_SLOPE:g}",
+        "limits": f"Up to {gentle:.3f} and {steep:.3f} no sinusoid of either material exceeds "
+        f"{percent(GENTLE_ERROR)} and {percent(STEEP_ERROR)} in light up to {STEEPEST_LIGHT:g}°",
+    }
 
 
-def _edges(measured: Measurements) -> str:
-    parts = [
-        """## Walls
-
-The model ignores light reflected by vertical walls. Period/depth, Kirchhoff / blend. On blazed
-gratings, light from positive angles is incident on the steps, light from negative angles on the
-facets."""
-    ]
-    for profile in ("lamellar", "blazed"):
-        angles = angles_of(measured.default["keratin"].where(profile=profile))
-        rows = [
-            [
-                f"{material}, {grating.period:g}/{grating.depth:g} µm",
-                *both_models(sides, grating, angles),
-            ]
-            for material, sides in measured.gratings.items()
-            for grating in gratings_of(sides["small_slope"], profile)
+def _edges(measured: Measurements, profile: str) -> str:
+    angles = angles_of(measured.default["keratin"].where(profile=profile))
+    rows = [
+        [
+            f"{material}, {grating.period:g}/{grating.depth:g} µm",
+            *both_models(sides, grating, angles),
         ]
-        header = [profile.capitalize(), *map(angle, angles)]
-        parts.append(table(header, rows))
-    return "\n\n".join(parts)
+        for material, sides in measured.gratings.items()
+        for grating in gratings_of(sides["small_slope"], profile)
+    ]
+    return table([profile.capitalize(), *map(angle, angles)], rows)
 
 
-def _aluminium(measured: Measurements) -> str:
+def _aluminium(measured: Measurements) -> dict[str, str]:
     sides = goals.with_half(measured.gratings["aluminium"])
     every = goals.singles(sides)
     better, worse = ([c for c in every if sign * c.gain > c.change] for sign in (1, -1))
@@ -129,17 +98,12 @@ def _aluminium(measured: Measurements) -> str:
         rows.append([case.label, angle(case.theta), *values[:3], f"{share:.2f}", *values[3:]])
     header = ["", "light from", "Kirchhoff", "blend", "change", "best share", "with it", "bound"]
     gains = [100 * case.gain for case in every]
-    return f"""## Aluminium: blend against Kirchhoff
-
-Of {len(every)} gratings and angles the blend is better in {len(better)}, at best by
-{max(gains):.1f} points, and worse in {len(worse)}, at most by {-min(gains):.2f} points.
-Differences below the last refinement of the solver (*change*) do not count. Worse on average:
-
-{table(header, rows)}
-
-*Best share* is the share of small slope, equal for all orders, with the least deviation; *bound* is
-the deviation if every order had its own. Where the best share is 0, Kirchhoff's errors cancel: both
-matrices lack light that is diffracted twice, and Kirchhoff's is brighter."""
+    return {
+        "tally": f"{len(every)} gratings and angles the blend is better in {len(better)}, at best "
+        f"by {max(gains):.1f} points, and worse in {len(worse)}, at most by {-min(gains):.2f} "
+        "points",
+        "aluminium-blend-against-kirchhoff": table(header, rows),
+    }
 
 
 def _goals(measured: Measurements) -> str:
@@ -158,16 +122,7 @@ def _goals(measured: Measurements) -> str:
             kirchhoff, default = (float(measure(deviations)) for deviations in cuts)
             reached = [percent(most), percent(kirchhoff), _reached(default, most)]
             rows.append([f"keratin, cuts of scales, slope 0.2, 0° to 60°, {name}", *reached])
-    worse = goals.much_worse(measured.gratings["keratin"])
-    names = ["goal", "Kirchhoff", "default"]
-    return f"""## Goals
-
-Light from 60°, on cuts of scales also from 0° and 30°:
-
-{table(["surface", *names], rows)}
-
-On keratin {len(worse)} gratings and angles are worse than Kirchhoff by more than a tenth (goal:
-0)."""
+    return table(["surface", "goal", "Kirchhoff", "default"], rows)
 
 
 def _reached(deviation: float, goal: float) -> str:

@@ -1,4 +1,4 @@
-"""docs/validation/numerics.md: closed forms of gratings, statistics of random surfaces."""
+"""Parts of docs/validation/numerics.md: closed forms of gratings, statistics of random surfaces."""
 
 from __future__ import annotations
 
@@ -13,18 +13,12 @@ from .measurements import Measurements
 _IDEAL = ((1.1, 0.4), (2.5, 0.1), (5.0, 0.4))
 
 
-def write(measured: Measurements) -> str:
-    """Write the page."""
-    return f"""# Closed forms and random surfaces
-
-Tests of the integral and the tables, not of the physical model.
-
-{_closed_forms(measured)}
-
-{_random_surfaces(measured)}"""
+def parts(measured: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
+    return {**_closed_forms(measured), **_random_surfaces(measured)}
 
 
-def _closed_forms(measured: Measurements) -> str:
+def _closed_forms(measured: Measurements) -> dict[str, str]:
     sizes = _IDEAL[1:2] if measured.quick else _IDEAL
     rows = []
     for profile in PROFILES:
@@ -34,16 +28,13 @@ def _closed_forms(measured: Measurements) -> str:
         orders = sum(item.orders for item in compared)
         rows.append([profile, orders, f"{integral:.1e}", f"{by_table:.1e}"])
     words = " or ".join(f"{period:g} and {depth:g}" for period, depth in sizes)
-    return f"""## Gratings in closed form
-
-Largest absolute error of an order's power |a_m|², with a sum of 1 over all orders. Light and
-orders up to {ANGLES[-1]:g}° from the normal, 410 to 760 nm, period and depth {words} µm, 512 pixels
-a period. The errors of lamellar and blazed gratings come from sampling.
-
-{table(["profile", "orders", "`reference.brdf`", "table"], rows)}"""
+    return {
+        "sizes": f"up to {ANGLES[-1]:g}° from the normal, 410 to 760 nm, period and depth {words}",
+        "gratings": table(["profile", "orders", "`reference.brdf`", "table"], rows),
+    }
 
 
-def _random_surfaces(measured: Measurements) -> str:
+def _random_surfaces(measured: Measurements) -> dict[str, str]:
     specular, offsets = measured.statistics.specular, measured.statistics.offsets
     estimates = zip(
         specular.places, specular.mean, specular.error, specular.exact, specular.distance,
@@ -58,17 +49,9 @@ def _random_surfaces(measured: Measurements) -> str:
          f"{np.abs(z).max():.1f}"]
         for each in (*measured.statistics.lobes.values(), offsets)
     ]  # fmt: skip
-    return f"""## Random surfaces
-
-Gaussian heights with the autocorrelation rms²·exp(−r²/T²), beside exp(−(κ·rms)²) with scattered
-light in the bin (order 0, left), the series of Beckmann and Spizzichino (lobes, middle) and
-`ensemble` (mean of `patch` at {offsets.count} random places, right).
-
-![Specular loss, scattered lobes, and the mean of patches](../images/validation_statistics.png)
-
-{table(["κ·rms", f"mean of {specular.count} surfaces", "exact", "in standard errors"], rows)}
-
-Differences of lobes and of the mean of patches, in standard errors; the expected root-mean-square
-is 1.
-
-{table(["rms", "directions", "root-mean-square", "largest"], lobes)}"""
+    header = ["κ·rms", f"mean of {specular.count} surfaces", "exact", "in standard errors"]
+    return {
+        "places": f"{offsets.count}",
+        "random-surfaces": table(header, rows),
+        "lobes": table(["rms", "directions", "root-mean-square", "largest"], lobes),
+    }

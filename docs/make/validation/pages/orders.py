@@ -1,4 +1,4 @@
-"""docs/validation/orders.md: shipped tables of solved orders."""
+"""Parts of docs/validation/orders.md: shipped tables of solved orders."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .markdown import percent, table
 from .measurements import Measurements
 
 
-def write(measured: Measurements) -> str:
-    """Write the page."""
+def parts(measured: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
     cases = [orders.Shipped(name) for name in orders.TABLES[: measured.most(1)]]
     mounts = orders.MOUNTS[: measured.most(1)]
     samples = measured.most(4) or orders.SAMPLES
@@ -22,51 +22,16 @@ def write(measured: Measurements) -> str:
         for light, values in case.diffuse(samples)
     ]
     header = ["table", "light", "colours", "absorbed", "bias", "mean", "95 %", "largest"]
-    return f"""# Solved orders
-
-The shipped tables of `diffraction_orders` and the default model, beside independent solutions
-([orders.md](../orders.md)). All are aluminium; `cd` and `dvd` are lamellar, under polycarbonate.
-
-{_deviations(cases, mounts)}
-
-θ and φ are the light's in air, φ from the direction across the grooves. Wavelengths are
-{", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS)} nm. [Colours](../validation.md) are all orders
-but 0 within 75°; *sum* is the largest deviation of the sum over all orders.
-
-The tables are solved by a boundary integral method, the independent solutions by coupled waves
-(`cd`, `dvd`) and Chandezon's method (`blazed`, `sinusoidal`).
-
-## Side by side
-
-Order 0, and the strongest other order within 75°, at {orders.SHOWN:g} nm; unpolarised light.
-
-{_side_by_side(cases, mounts)}
-
-## Interpolation
-
-The tables beside their own solver, at {samples}
-random directions of diffuse light and wavelengths.
-*Absorbed* is the share of light in no order, *bias* the relative deviation of its mean. The last
-three columns are the deviation of *absorbed* as a share of the incident light.
-
-{table(header, diffuse)}
-
-The largest deviations lie beside surface plasmons, which are narrower than the distance of nodes.
-[orders.md](../orders.md#profiles-materials-and-accuracy) has the errors that the tables state.
-
-## Published efficiencies
-
-Efficiencies from Johnson 2005 (for Li 1993), Granet and Guizal 1996, Lalanne and Hugonin 2000 and
-RETICOLO V10: s and p across the grooves, u unpolarised. The tolerance is the rounding of the
-printed digits, or the error of the printed method.
-
-{_published(PUBLISHED[1:2] if measured.quick else PUBLISHED)}
-
-## Films, layers, blocks and crossed gratings
-
-{_stacks(measured)}
-
-Measured gratings: [measured.md](measured.md)."""
+    return {
+        "solved-orders": _deviations(cases, mounts),
+        "wavelengths": ", ".join(f"{lam:g}" for lam in orders.WAVELENGTHS),
+        "shown": f"{orders.SHOWN:g}",
+        "side-by-side": _side_by_side(cases, mounts),
+        "samples": f"{samples}",
+        "interpolation": table(header, diffuse),
+        "published-efficiencies": _published(PUBLISHED[1:2] if measured.quick else PUBLISHED),
+        "films-layers-blocks-and-crossed-gratings": _stacks(measured),
+    }
 
 
 def _deviations(cases: Sequence[orders.Shipped], mounts: Sequence[tuple[int, int]]) -> str:

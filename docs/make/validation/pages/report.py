@@ -1,15 +1,13 @@
-"""List of the pages of the validation, and the function that writes them."""
+"""List of the pages of the validation, and the function that writes their parts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from docs.make.figures.long_tables import write_page
-from docs.make.figures.pages import write_figure, write_text
-from mitsuba_diffraction.progress import Progress, silent
+from docs.make.figures import long_tables, pages
 
 from ..cases import PROBE_GRATING, Grating
 from . import (
@@ -27,18 +25,18 @@ from . import (
 )
 from .measurements import Measurements
 
-#: Function that writes the text of each page, by the page's name.
-PAGES: dict[str, Callable[[Measurements], str]] = {
-    "validation": front.write,
-    "gratings": gratings.write,
-    "surfaces": surfaces.write,
-    "layers": layers.write,
-    "transmission": transmission.write,
-    "orders": orders.write,
-    "conductor": conductor.write,
-    "numerics": numerics.write,
-    "solutions": solutions.write,
-    "scans": scans.write,
+#: Function that makes the parts of each page, by the page's name.
+PAGES: dict[str, Callable[[Measurements], dict[str, str]]] = {
+    "validation": front.parts,
+    "gratings": gratings.parts,
+    "surfaces": surfaces.parts,
+    "layers": layers.parts,
+    "transmission": transmission.parts,
+    "orders": orders.parts,
+    "conductor": conductor.parts,
+    "numerics": numerics.parts,
+    "solutions": solutions.parts,
+    "scans": scans.parts,
 }
 
 _EXAMPLES = (
@@ -66,40 +64,16 @@ def page_path(folder: Path, name: str) -> Path:
     )
 
 
-def write_report(
-    folder: Path,
-    names: Sequence[str] = tuple(PAGES),
-    *,
-    quick: bool = False,
-    progress: Progress | None = None,
-) -> list[Path]:
-    """Write pages and their pictures.
+def write(folder: Path, name: str, measured: Measurements) -> Path:
+    """Write the parts of a page and its picture, and return the page's path.
 
-    Parameters
-    ----------
-    folder : of the documentation; created if missing.
-    names : of `PAGES`.
-    quick : a small version for tests: one wavelength, few gratings and random surfaces.
-    progress : called as progress(done, total, text).
-
-    Returns
-    -------
-    Paths of the pages.
+    folder : of the documentation, with the pages.
     """
-    tell = progress or silent
-    measured = Measurements(quick=quick)
-    for path in (folder / "images", folder / "validation"):
-        path.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for n, name in enumerate(names):
-        paths.append(page_path(folder, name))
-        tell(n, len(names), f"writing {paths[-1].name}")
-        if name in _PICTURES:
-            picture, draw = _PICTURES[name]
-            write_figure(folder / "images" / f"validation_{picture}.png", draw(measured), _DPI)
-        text = PAGES[name](measured)
-        # the front page's tables say the most
-        write = write_text if name == "validation" else write_page
-        write(paths[-1], text + "\n")
-    tell(len(names), len(names), "done")
-    return paths
+    path = page_path(folder, name)
+    if name in _PICTURES:
+        picture, draw = _PICTURES[name]
+        pages.write_figure(folder / "images" / f"validation_{picture}.png", draw(measured), _DPI)
+    # the front page's tables say the most
+    update = pages.update if name == "validation" else long_tables.update
+    update(path, PAGES[name](measured))
+    return path

@@ -1,4 +1,4 @@
-"""docs/validation/solutions.md: how the comparison is made, and how exact the solutions are."""
+"""Parts of docs/validation/solutions.md: how exact the rigorous solutions are."""
 
 from __future__ import annotations
 
@@ -12,30 +12,19 @@ from .markdown import joined, percent, table
 from .measurements import Measurements
 
 
-def write(_: Measurements) -> str:
-    """Write the page."""
-    parts = [_method(), _gratings(), _two_solvers(), _cells()]
-    return "\n\n".join(parts)
-
-
-def _method() -> str:
-    return r"""# The rigorous solutions
-
-## Efficiency of an order
-
-The power of order m is the integral of $f \cos\theta_o$ over its lobe. Through a window much wider
-than the period it is
-
-$$
-\eta_m = \frac{4 \cos\theta_i \cos\theta_m N}{w^2} \, |a_m(k w)|^2, \qquad
-w = \cos\theta_i + \cos\theta_m ,
-$$
-
-with N of [theory.md](../theory.md). Comparisons have $\eta_m$ from `md.reference.brdf` at the
-centre of the lobe, before energy is conserved.
-
-`python -m docs.make.validation.solve` (extra `validation`) computes the solutions in
-docs/make/validation/data."""
+def parts(_: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
+    solvers = shipped("perfect"), shipped("keratin", "coupled_wave")
+    first, second = (solved.about["solver"] for solved in solvers)
+    return {
+        "periods": joined(PERIODS),
+        "solver": first,
+        "converged": f"{CONVERGED:g}",
+        "gratings": _gratings(),
+        "second-solver": second,
+        "two-solvers-on-gratings": _two_solvers(),
+        **_cells(),
+    }
 
 
 def _gratings() -> str:
@@ -59,19 +48,7 @@ def _gratings() -> str:
         "material (index)", "gratings", "orders", "change: median", "99 %", "largest",
         "energy missed", "left out",
     ]  # fmt: skip
-    return f"""## Gratings
-
-Sinusoidal, lamellar (half high) and blazed gratings; periods {joined(PERIODS)} µm, depths 0.05 to
-0.4 µm, light from 0° to 75° in both polarisations, on blazed gratings from both sides. Solver:
-{shipped("perfect").about["solver"]}.
-
-*Change* is the last change of an efficiency when the mesh is refined. *Energy missed* is the
-deviation of orders and absorption from 1. Solutions whose change is above {CONVERGED:g} are left
-out.
-
-{table(header, rows)}
-
-![Every order: blend against rigorous efficiency](../images/validation_materials.png)"""
+    return table(header, rows)
 
 
 def _two_solvers() -> str:
@@ -84,16 +61,11 @@ def _two_solvers() -> str:
         ]
         for part in on_gratings()
     ]
-    return f"""## Two solvers on gratings
-
-The second solver is {shipped("keratin", "coupled_wave").about["solver"]}. On slopes of metal they
-do not converge for TM light, which is left out. Differences of efficiencies, and the second
-solver's change when its orders and layers doubled:
-
-{table(["case", "orders", "strongest", "difference: median", "largest", "own change"], pairs)}"""
+    header = ["case", "orders", "strongest", "difference: median", "largest", "own change"]
+    return table(header, pairs)
 
 
-def _cells() -> str:
+def _cells() -> dict[str, str]:
     compared = on_cells()
     rows = []
     for surface, wavelength in dict.fromkeys(
@@ -109,15 +81,8 @@ def _cells() -> str:
     coarse, fine = rayleigh.resolutions(crossing)
     (first, _), (second, _) = crossed.resolutions(crossing)
     header = ["keratin", "nm", "directions", "difference", "change", "change, coupled waves"]
-    other = shipped("keratin", "patches_coupled_wave").about["solver"]
-    return f"""## Two solvers in two dimensions
-
-Rayleigh's expansion, whose solutions the comparisons use, beside {other}. *Difference* is the
-deviation of colours, *change* that of each solution from {coarse} to {fine} and from {first} to
-{second} harmonics: the largest of all directions.
-
-{table(header, rows)}
-
-On aluminium coupled waves do not converge. There Rayleigh's expansion agrees with the integral
-method within 3e-5 of an efficiency on sinusoids of depth/period up to 0.09. On keratin R + T is 1
-within 1e-6 (crossed grating) and 1e-3 (low pits of a CD)."""
+    return {
+        "coupled-waves": shipped("keratin", "patches_coupled_wave").about["solver"],
+        "harmonics": f"{coarse} to {fine} and from {first} to {second}",
+        "two-solvers-in-two-dimensions": table(header, rows),
+    }

@@ -1,4 +1,4 @@
-"""docs/validation/surfaces.md: cells in two dimensions, in any plane of incidence."""
+"""Parts of docs/validation/surfaces.md: cells in two dimensions, in any plane of incidence."""
 
 from __future__ import annotations
 
@@ -14,29 +14,13 @@ from .markdown import angle, percent, table
 from .measurements import Measurements
 
 
-def write(measured: Measurements) -> str:
-    """Write the page."""
-    cells = measured.cells
+def parts(measured: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
     header = ["surface", "RMS slope", "nm", *map(angle, ANGLES), "change"]
-    return f"""# Surfaces in two dimensions
-
-Deviation of colours on small periodic cells: sinusoids in conical mounts, a crossed grating, and
-cuts of 2.6 µm of a measured scale (*Elaphe*), of its look-alike, and of 3.2 µm of a CD. The cuts
-are made periodic, smoothed and scaled to an RMS slope. The solver is Rayleigh's expansion, which
-does not converge on steeper metals.
-
-## Unpolarised light
-
-Mean over the planes of incidence, as Kirchhoff / small slope alone / the default. *Change* is the
-largest change of the solution by more harmonics.
-
-{table(header, list(_unpolarised(cells)))}
-
-## Polarised light
-
-Light from 60°, mean over the planes of incidence, as Kirchhoff / the default.
-
-{table(["surface", "nm", "s", "p"], list(_polarised(cells)))}"""
+    return {
+        "unpolarised-light": table(header, list(_unpolarised(measured.cells))),
+        "polarised-light": table(["surface", "nm", "s", "p"], list(_polarised(measured.cells))),
+    }
 
 
 def _unpolarised(cells: Mapping[str, Sides]) -> Iterator[list[object]]:

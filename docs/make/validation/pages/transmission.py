@@ -1,4 +1,4 @@
-"""docs/validation/transmission.md: orders that go through a dielectric, and R + T."""
+"""Parts of docs/validation/transmission.md: orders that go through a dielectric, and R + T."""
 
 from __future__ import annotations
 
@@ -17,18 +17,26 @@ from .measurements import Measurements
 _GENTLE = 0.033
 
 
-def write(measured: Measurements) -> str:
-    """Write the page."""
-    return f"""# Through a dielectric
+def parts(measured: Measurements) -> dict[str, str]:
+    """Return the parts of the page by name."""
+    sums = list(transmitted.sums_of_surfaces(list(transmitted.SURFACES)[: measured.most(1)]))
+    rows = [
+        [
+            one.surface,
+            f"{one.medium}, {one.side}",
+            *(f"{_span(one.model[at])} → {_span(one.conserved[at])}" for at in one.model),
+        ]
+        for one in sums
+    ]
+    return {
+        **_orders(measured),
+        "index": f"{transmitted.INDEX:g}",
+        "reflected-and-transmitted-light": table(["surface", "light", *sums[0].model], rows),
+        "recipes": _recipes(measured),
+    }
 
-{_orders(measured)}
 
-{_surfaces(measured)}
-
-{_recipes(measured)}"""
-
-
-def _orders(measured: Measurements) -> str:
+def _orders(measured: Measurements) -> dict[str, str]:
     chosen = transmitted.GRATINGS[: measured.most(1)]
     sides = transmitted.compared(chosen)
     by_azimuth = {
@@ -48,37 +56,11 @@ def _orders(measured: Measurements) -> str:
     ]
     normal, worst = float(np.max(default, axis=(0, 1))[0]), float(np.max(default))
     header = ["sinusoid", "azimuth", *map(angle, transmitted.ANGLES)]
-    return f"""## Transmitted orders
-
-Light from above into keratin, beside Rayleigh's expansion. The light falls across the grooves
-(azimuth 0°), between and along them; the steepest slopes are 0.03 to 0.2. Deviation of the colours
-within {GRAZING:g}° of the normal, as Kirchhoff / `small_slope`:
-
-{table(header, rows)}
-
-At slopes up to 0.1 `small_slope` is within {percent(normal)} in light along the normal, and within
-{percent(worst)} up to 75°."""
-
-
-def _surfaces(measured: Measurements) -> str:
-    sums = list(transmitted.sums_of_surfaces(list(transmitted.SURFACES)[: measured.most(1)]))
-    rows = [
-        [
-            one.surface,
-            f"{one.medium}, {one.side}",
-            *(f"{_span(one.model[at])} → {_span(one.conserved[at])}" for at in one.model),
-        ]
-        for one in sums
-    ]
-    return f"""## Reflected and transmitted light
-
-A lossless dielectric has R + T = 1. Least and largest R + T of 24 azimuths at 450, 550 and 650 nm,
-for the index {transmitted.INDEX:g} and a coherence width of 20 µm, as `info --energy` prints them:
-model → `energy_conserving`, the default.
-
-{table(["surface", "light", *sums[0].model], rows)}
-
-Missing light is shared by all orders."""
+    return {
+        "grazing": f"{GRAZING:g}°",
+        "transmitted-orders": table(header, rows),
+        "gentle": f"{percent(normal)} in light along the normal, and within {percent(worst)}",
+    }
 
 
 def _recipes(measured: Measurements) -> str:
@@ -93,12 +75,7 @@ def _recipes(measured: Measurements) -> str:
         )
         rows.append([name, medium, *(_span([s for span in part for s in span]) for part in spans)])
     header = ["recipe", "medium", "model", "`energy_conserving`"]
-    return f"""### Recipes
-
-Least and largest R + T of light from both sides up to 75°, coherence width 65 µm (12 µm for the
-hologram).
-
-{table(header, rows)}"""
+    return table(header, rows)
 
 
 def _span(values: Sequence[float]) -> str:
