@@ -185,7 +185,7 @@ def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg:
     error = float(np.sqrt(np.sum((weight * np.expm1(fit.fun / weight)) ** 2)))
     if error > _WORST_FIT:
         raise DiffractionError(
-            f"the spectrum is {error:.0%} RMS off the nearest model, more than {_WORST_FIT:.0%}: it "
+            f"the spectrum is {error:.0%} RMS off the nearest one, more than {_WORST_FIT:.0%}: it "
             "has peaks or a band, as of a grating, and the model one slope; use the spectrum itself"
         )
     a, b, g = float(np.exp(fit.x[0])), float(np.exp(fit.x[1])), float(fit.x[2])

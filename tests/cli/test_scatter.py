@@ -95,7 +95,7 @@ def test_scatter_by_theory_and_table_is_of_one_band(run, here, shape, bow):
     asked = ("scatter", "scan.npy", "--pixel-size", "0.1", "--json", "figures.json")
     run(*asked).succeeded()
     row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
-    # the table's windows and the one of the spectrum weigh places of the scan differently: 1 to 12 %
+    # the table's windows weigh places of the scan otherwise than the one of the spectrum: 1 to 12 %
     # of eight such scans
     assert row["tis_table"] == pytest.approx(row["tis_rayleigh_rice"], rel=0.15)
     # cosθ lessens the scatter by a few per cent
