@@ -11,7 +11,6 @@ import numpy as np
 
 from ..columns import save_numbers
 from ..errors import DiffractionError
-from ..heights import Source
 from ..heights.coherence import resolved
 from ..images import save_figure
 from ..settings import TableSettings
@@ -57,8 +56,7 @@ def run(args: argparse.Namespace) -> Figures:
     )
 
     field, settings = options.load_patch(args)
-    recipe = Source.of(args.source, options.load_options(args)).as_recipe()
-    if field.cut_out and recipe is not None and recipe.options.level is None:
+    if field.cut_out and options.level_of(args) is None:
         field = field.treated(level="quadratic")  # the form of a mirror is no roughness
     asked = TableSettings(**settings | {"wavelength_range": ends})
     longest = longest_of(resolved(asked, [field]))
