@@ -318,7 +318,7 @@ def _windows(
                  "window_error": fits.error}  # fmt: skip
         lines.append(
             ("windows", f"{periods.size} of {args.positions} window positions: "
-             f"{1e3 * fits.mean:.5g} ± {1e3 * fits.spread:.2g} nm, {periods.min():.5g} to "
+             f"{1e3 * fits.mean:.5g} ± {1e3 * fits.total:.2g} nm each, {periods.min():.5g} to "
              f"{periods.max():.5g} nm")
         )  # fmt: skip
     try:

@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import DiffractionError, quoted
 from ..heights import HeightField, LoadOptions, Source, units_warning
 from ..heights.coherence import resolved
-from ..heights.read import OPTIONS
+from ..heights.read import BY_DEFAULT, OPTIONS
 from ..heights.source import notes_line
 from ..optics.display import VIEWS
 from ..retired import REPLACED
@@ -384,6 +384,12 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     return source.field(), {name: settings[name] for name in TABLE_NAMES if name in settings}
 
 
+def level_of(args: argparse.Namespace) -> str | None:
+    """Return the surface to subtract that the command line or a recipe names, or None."""
+    recipe = Source.of(args.source, load_options(args)).as_recipe()
+    return None if recipe is None else recipe.options.level
+
+
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, and its refusal if size alone decides."""
     how = resolved(settings, fields)
@@ -401,5 +407,6 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
 
 def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:
     """Return a line on the number of notes on heights and the command that prints them, or ""."""
-    lines = table_warnings([field], settings)
+    lines = [line for line in field.history if line.endswith(BY_DEFAULT)]
+    lines += table_warnings([field], settings)
     return notes_line(lines, args.source, load_options(args), settings)

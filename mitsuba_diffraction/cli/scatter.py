@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..columns import save_numbers
+from ..errors import DiffractionError
+from ..heights.coherence import resolved
 from ..images import save_figure
 from ..settings import TableSettings
 from ..tables.build.build import build_with
@@ -23,9 +26,10 @@ _WAVELENGTH = 632.8
 
 @options.command(
     "scatter", "power spectrum and scatter of a rough mirror",
-    "Write the power spectral density of the heights as CSV and a picture, and print RMS, "
-    "slope, band, the total integrated scatter by Rayleigh-Rice (Q = R) beside that of the "
-    "table's orders, and an ABg model, at normal incidence and over the reflectance.",
+    "Write the power spectral density of the heights as CSV and a picture, and print RMS, slope, "
+    "the total integrated scatter by Rayleigh-Rice (Q = R) beside that of the table's orders, all "
+    "of one printed band, and an ABg model, at normal incidence and over the reflectance. Of a "
+    "scan, the best surface of second degree is form and subtracted, unless --level names another.",
     options.SOURCE,
     ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
      "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
@@ -44,58 +48,73 @@ def run(args: argparse.Namespace) -> Figures:
     from matplotlib.figure import Figure
 
     from ..heights.scatter import (
-        WORST_FIT,
         ABg,
         abg_model,
+        longest_of,
         power_spectrum,
         rayleigh_rice_scatter,
     )
 
     field, settings = options.load_patch(args)
-    spectrum = power_spectrum(field)
+    if field.cut_out and options.level_of(args) is None:
+        field = field.treated(level="quadratic")  # the form of a mirror is no roughness
     asked = TableSettings(**settings | {"wavelength_range": ends})
+    longest = longest_of(resolved(asked, [field]))
+    spectrum = power_spectrum(field, longest)
     with Bar(args) as bar:
         table = build_with(field, asked, bar)
     if notes := options.notes(args, field, asked):
         say_warning(notes)
     rows: list[dict[str, Any]] = []
+    models: list[str] = []
     for wavelength in args.wavelengths:
-        model = abg_model(spectrum, wavelength)
-        rows.append({
-            "wavelength": wavelength,
-            "tis_rayleigh_rice": rayleigh_rice_scatter(field, wavelength),
-            "tis_table": scattered_share(table, wavelength),
-            **(dict.fromkeys(ABg._fields) if model is None else model._asdict()),
-        })  # fmt: skip
+        scatter = rayleigh_rice_scatter(field, wavelength, longest)
+        row = {
+            "wavelength": wavelength, "rms_um": scatter.rms, "band_um": list(scatter.band),
+            "tis_rayleigh_rice": scatter.share,
+            "tis_table": scattered_share(table, wavelength, scatter.band),
+        }  # fmt: skip
+        try:
+            model = abg_model(spectrum, wavelength)
+        except DiffractionError as error:
+            rows.append(row | dict.fromkeys(ABg._fields))
+            models.append(f"no ABg model: {error}")
+        else:
+            rows.append(row | model._asdict())
+            low, high = model.range
+            models.append(
+                f"A {model.a:.3g} 1/sr, B {model.b:.3g}, g {model.g:.3g} for |β − β₀| "
+                f"{low:.2g} to {high:.2g}, within {model.error:.0%}"
+            )
     numbers = np.column_stack([spectrum.frequency, spectrum.density])
     save_numbers(output, ("frequency_per_um", "psd_um4"), numbers)
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
-    axes.loglog(spectrum.frequency, spectrum.density, label="heights")
+    axes.plot(spectrum.frequency, spectrum.density, label="heights")
+    if spectrum.rms > 0.0:  # no logarithm shows a flat patch
+        axes.set(xscale="log", yscale="log")
     if rows[0]["range"] is not None:
         lam = 1e-3 * rows[0]["wavelength"]
         beta = np.geomspace(rows[0]["range"][0], rows[0]["range"][1], 64)
         fitted = rows[0]["a"] / (rows[0]["b"] + beta ** rows[0]["g"])
-        axes.loglog(beta / lam, fitted * lam**4 / (16.0 * np.pi**2), "--", label="ABg model")
+        axes.plot(beta / lam, fitted * lam**4 / (16.0 * np.pi**2), "--", label="ABg model")
     axes.set(xlabel="spatial frequency, 1/µm", ylabel="power spectral density, µm⁴")
     axes.legend()
     save_figure(output.with_suffix(".png"), figure)
-    short, long = spectrum.band
     print(f"{args.source} -> {output}, {output.with_suffix('.png')}")
-    print(
-        f"  heights   {1e3 * spectrum.rms:.3g} nm RMS, slope {spectrum.slope:.3g}, spatial "
-        f"wavelengths {short:.3g} to {long:.3g} µm"
-    )
-    for row in rows:
-        fit = f"no ABg model fits within {WORST_FIT:.0%}"
-        if row["range"] is not None:
-            fit = (
-                f"A {row['a']:.3g} 1/sr, B {row['b']:.3g}, g {row['g']:.3g} for |β − β₀| "
-                f"{row['range'][0]:.2g} to {row['range'][1]:.2g}, within {row['error']:.0%}"
-            )
+    print(f"  heights   {_of_band(spectrum.rms, spectrum.band)}, slope {spectrum.slope:.3g}")
+    for line in field.history:
+        print(f"            {line}")
+    for row, model_text in zip(rows, models, strict=True):
         print(
-            f"  {row['wavelength']:g} nm  TIS {row['tis_rayleigh_rice']:.3g} by Rayleigh-Rice, "
-            f"{row['tis_table']:.3g} of the table; {fit}"
+            f"  {row['wavelength']:g} nm  {_of_band(row['rms_um'], row['band_um'])}, TIS "
+            f"{row['tis_rayleigh_rice']:.3g} by Rayleigh-Rice, {row['tis_table']:.3g} of the "
+            f"table\n            {model_text}"
         )
     return {"rms_um": spectrum.rms, "slope": spectrum.slope, "band_um": list(spectrum.band),
             "wavelengths": rows}  # fmt: skip
+
+
+def _of_band(rms: float, band: Sequence[float]) -> str:
+    """Describe the RMS height of a band of spatial wavelengths, all in µm."""
+    return f"{1e3 * rms:.3g} nm RMS of spatial wavelengths {band[0]:.3g} to {band[1]:.3g} µm"

@@ -165,6 +165,12 @@ def _harmonic(start: Real, missing: npt.NDArray[np.bool_]) -> Real:
     return filled
 
 
+def hann(field: HeightField) -> tuple[Real, Real]:
+    """Return Hann windows of the pixels along y (ny,) and x (nx,), above 0 at their ends."""
+    ny, nx = field.shape
+    return np.hanning(ny + 2)[1:-1], np.hanning(nx + 2)[1:-1]
+
+
 def plane_of(
     field: HeightField, tapers: tuple[Real | None, Real | None] = (None, None)
 ) -> tuple[float, float]:

@@ -149,6 +149,8 @@ OPTIONS = parameters_of(LoadOptions)
 
 _READERS = {FileKind.IMAGE: read_image, FileKind.NPY: read_npy, FileKind.TEXT: read_text}
 
+#: End of the history line of a treatment that nobody asked for.
+BY_DEFAULT = " (by default; level=none leaves it out)"
 # µm; a tilt at this wavelength is nearly one at longer wavelengths.
 _SHORTEST = 0.36
 _PIXELS = f"{SHORTEST_PIXEL:g} to {LONGEST_PIXEL:g} µm"
@@ -182,8 +184,7 @@ def treated_by_default(
     if options.level is None and options.periodic != "exact" and small and tilted(field, _SHORTEST):
         field = LEVELS["plane"](field)
         *lines, last = field.history
-        # nobody asked for this treatment
-        field = replace(field, history=(*lines, f"{last} (by default; level=none leaves it out)"))
+        field = replace(field, history=(*lines, last + BY_DEFAULT))
     elif measured and options.level in (None, "none"):
         rise = preprocess.plane_rise(field)
         line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"

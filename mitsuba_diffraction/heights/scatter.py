@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 
 from ..arrays import Real
 from ..errors import DiffractionError, counted, warn
+from ..settings import TableSettings
 from .field import HeightField
 from .spectra import frequencies, height_spectrum
 
@@ -24,8 +25,13 @@ _RINGS = 6
 _MOST_SCATTER = 0.1
 #: Fewest rings that an ABg model is fitted to.
 _FEWEST = 5
-#: RMS relative difference from the spectrum above which a model describes nothing.
-WORST_FIT = 1.0
+# RMS relative difference from the spectrum above which a model describes nothing.
+_WORST_FIT = 1.0
+# Fewest periods in a window of a scan: of two, an eighth of a bow's power is left beside the
+# mirror's lobe, and windows of spectrum and table agree to some 10 %; of one, to a factor of two.
+_PERIODS = 2.0
+# Frequencies on the edge of a band are in it.
+_ALMOST = 0.999
 
 
 class PowerSpectrum(NamedTuple):
@@ -48,6 +54,21 @@ class PowerSpectrum(NamedTuple):
     band: tuple[float, float]
 
 
+class Scatter(NamedTuple):
+    """Total integrated scatter at normal incidence, over the reflectance, and its roughness.
+
+    Attributes
+    ----------
+    share : of the reflected light.
+    rms : RMS height of the band, µm.
+    band : shortest and longest spatial wavelength that scatters, µm.
+    """
+
+    share: float
+    rms: float
+    band: tuple[float, float]
+
+
 class ABg(NamedTuple):
     """ABg model of a BRDF, A/(B + |β − β₀|^g) in 1/sr, over the reflectance.
 
@@ -64,39 +85,45 @@ class ABg(NamedTuple):
     error: float
 
 
-def power_spectrum(field: HeightField) -> PowerSpectrum:
+def longest_of(settings: TableSettings) -> float | None:
+    """Return the longest spatial wavelength, µm, that windows of a scan tell from its form.
+
+    None of patches that tile the plane, whose orders are apart from the mirror direction.
+
+    settings : resolved, of the scan's table.
+    """
+    return None if settings.taper_width is None else settings.width / _PERIODS
+
+
+def power_spectrum(field: HeightField, longest: float | None = None) -> PowerSpectrum:
     """Return the power spectrum of a patch.
+
+    longest : longest spatial wavelength, µm; None for the larger side of the patch.
 
     Raises a DiffractionError if the patch has too few pixels.
     """
-    density = height_spectrum(field, windowed=not field.periodic)
-    fx, fy = frequencies(field)
-    radius = np.hypot(fx, fy)
-    (ny, nx), (dx, dy) = field.shape, field.pixel_size
-    low, high = 1.0 / min(nx * dx, ny * dy), 0.5 / max(dx, dy)
-    inside = (radius >= 0.999 * low) & (radius <= high)
-    if not inside.any():
-        raise DiffractionError(f"{field.name} has too few pixels for a power spectrum")
-    ring = np.floor(_RINGS * np.log2(radius[inside] / (0.999 * low))).astype(int)
+    radius, density, cell, band = _modes(field, longest)
+    ring = np.floor(_RINGS * np.log2(radius * band[1] / _ALMOST)).astype(int)
     counts = np.bincount(ring)
     known = counts > 0
-    middle, mean = (
-        np.bincount(ring, part[inside])[known] / counts[known] for part in (radius, density)
-    )
-    cell = 1.0 / (nx * dx * ny * dy)
-    power = density[inside] * cell
-    slope = float(np.sqrt((power * (2.0 * np.pi * radius[inside]) ** 2).sum()))
-    rms, band = float(np.sqrt(power.sum())), (1.0 / high, 1.0 / low)
+    middle, mean = (np.bincount(ring, part)[known] / counts[known] for part in (radius, density))
+    slope = float(np.sqrt((density * (2.0 * np.pi * radius) ** 2).sum() * cell))
+    rms = float(np.sqrt(density.sum() * cell))
     return PowerSpectrum(middle, mean, counts[known], rms, slope, band)
 
 
-def rayleigh_rice_scatter(field: HeightField, wavelength: float) -> float:
-    """Return the total integrated scatter of a mirror at normal incidence, over its reflectance.
+def rayleigh_rice_scatter(
+    field: HeightField, wavelength: float, longest: float | None = None
+) -> Scatter:
+    """Return the total integrated scatter of a mirror at normal incidence.
 
     ∫ (16π²/λ²) cosθ S₂ d²f over f < 1/λ: (4πσ/λ)² of a smooth, slowly varying surface. Warns
     where that exceeds 0.1: the theory is of its first power.
 
     wavelength : nm.
+    longest : as of `power_spectrum`.
+
+    Raises a DiffractionError as `power_spectrum` does.
     """
     lam = 1e-3 * wavelength
     if (scatter := (4.0 * np.pi * float(field.heights.std()) / lam) ** 2) > _MOST_SCATTER:
@@ -104,31 +131,44 @@ def rayleigh_rice_scatter(field: HeightField, wavelength: float) -> float:
             f"{field.name}: (4πσ/λ)² is {scatter:.2g} at {wavelength:g} nm, and Rayleigh-Rice "
             f"theory is for at most {_MOST_SCATTER:g}; go by the scatter of the table"
         )
+    radius, density, cell, band = _modes(field, longest)
+    square = 1.0 - (lam * radius) ** 2
+    power = density[square > 0.0] * cell
+    share = float((16.0 * np.pi**2 / lam**2 * np.sqrt(square[square > 0.0]) * power).sum())
+    return Scatter(share, float(np.sqrt(power.sum())), (max(lam, band[0]), band[1]))
+
+
+def _modes(
+    field: HeightField, longest: float | None
+) -> tuple[Real, Real, float, tuple[float, float]]:
+    """Return frequencies (n,) of a band, 1/µm, their S₂ (n,), the area of each, and the band."""
     fx, fy = frequencies(field)
-    cosine = np.sqrt(np.maximum(1.0 - lam**2 * (fx**2 + fy**2), 0.0))
+    radius = np.hypot(fx, fy)
+    (width, height), shortest = field.extent, 2.0 * max(field.pixel_size)
+    band = shortest, longest or max(width, height)
+    inside = (radius >= _ALMOST / band[1]) & (radius <= 1.0 / band[0])
+    if not inside.any():
+        raise DiffractionError(f"{field.name} has too few pixels for a power spectrum")
     density = height_spectrum(field, windowed=not field.periodic)
-    (ny, nx), (dx, dy) = field.shape, field.pixel_size
-    return float((16.0 * np.pi**2 / lam**2 * cosine * density).sum() / (nx * dx * ny * dy))
+    return radius[inside], density[inside], 1.0 / (width * height), band
 
 
-def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg | None:
+def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg:
     """Fit the ABg model to a spectrum at a wavelength, nm, in logarithms over its modes.
 
-    Return None if its error exceeds `WORST_FIT`, as of gratings and of bands of roughness.
-
-    Raises a DiffractionError if the heights are flat, or fewer than five rings of the spectrum
-    scatter the light.
+    Raises a DiffractionError if the heights are flat, fewer than five rings of the spectrum
+    scatter the light, or the model's error exceeds 100 %, as of gratings.
     """
     if spectrum.rms == 0.0:
-        raise DiffractionError("the heights are flat and scatter no light; an ABg model needs some")
+        raise DiffractionError("the heights are flat and scatter no light")
     lam = 1e-3 * wavelength
     beta = lam * spectrum.frequency
     used = (beta < 1.0) & (spectrum.density > 0.0)
     if used.sum() < _FEWEST:
         raise DiffractionError(
-            f"{wavelength:g} nm: the spectrum from {spectrum.band[0]:.3g} to "
-            f"{spectrum.band[1]:.3g} µm has {counted(int(used.sum()), 'ring')} within sin θ < 1, "
-            f"and an ABg model needs {_FEWEST}; take a larger patch, or a shorter wavelength"
+            f"the spectrum from {spectrum.band[0]:.3g} to {spectrum.band[1]:.3g} µm has "
+            f"{counted(int(used.sum()), 'ring')} within sin θ < 1, and the model needs {_FEWEST}; "
+            "take a larger patch, or a shorter wavelength"
         )
     beta = beta[used]
     # rings of few modes are known least
@@ -143,7 +183,10 @@ def abg_model(spectrum: PowerSpectrum, wavelength: float) -> ABg | None:
     limits = ([-80.0, -60.0, 0.0], [80.0, 5.0, 8.0])
     fit = least_squares(residuals, np.clip(start, *limits), bounds=limits)
     error = float(np.sqrt(np.sum((weight * np.expm1(fit.fun / weight)) ** 2)))
-    if error > WORST_FIT:
-        return None
+    if error > _WORST_FIT:
+        raise DiffractionError(
+            f"the spectrum is {error:.0%} RMS off the nearest one, more than {_WORST_FIT:.0%}: it "
+            "has peaks or a band, as of a grating, and the model one slope; use the spectrum itself"
+        )
     a, b, g = float(np.exp(fit.x[0])), float(np.exp(fit.x[1])), float(fit.x[2])
     return ABg(a, b, g, (float(beta[0]), float(beta[-1])), error)

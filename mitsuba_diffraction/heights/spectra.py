@@ -16,7 +16,7 @@ import scipy
 
 from ..arrays import Real
 from .field import HeightField
-from .preprocess import arc_of
+from .preprocess import arc_of, hann
 
 #: Least ratio of a grating's peak to the median of all directions at its frequency, and to that of
 #: lower frequencies in its direction. Rough surfaces reach 20 by chance, snakes' fingers 1e4.
@@ -71,7 +71,7 @@ def height_spectrum(field: HeightField, windowed: bool = True) -> Real:
     """
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
     # without the zeros at the window's ends, which would be the whole window of two rows
-    window = np.hanning(ny + 2)[1:-1, None] * np.hanning(nx + 2)[1:-1]
+    window = np.outer(*hann(field))
     window /= np.sqrt(np.mean(window**2))
     heights = field.heights - field.heights.mean()
     amplitude = np.fft.fft2(heights * window if windowed else heights)

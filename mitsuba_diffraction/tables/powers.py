@@ -60,19 +60,24 @@ def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
     return table.expansion.power_of(parts)
 
 
-def scattered_share(table: DiffractionTable, wavelength: float) -> float:
+def scattered_share(
+    table: DiffractionTable, wavelength: float, band: tuple[float, float] = (0.0, np.inf)
+) -> float:
     """Return the share of light along the normal that a perfect mirror of these heights scatters.
 
     Σ |a_j(κ_j)|² 4 cosθ/(1 + cosθ)² over the orders that propagate but order 0, κ_j = k (1 + cosθ):
     the albedo of `energy.transport`, whose lobes are points here. At most 1 of small slopes.
 
     wavelength : nm.
+    band : shortest and longest spatial wavelength of the orders that count, µm.
     """
     k, (last_x, last_y) = float(wavenumber(wavelength)), table.grid.last
     x, y = np.arange(-last_x, last_x + 1), np.arange(-last_y, last_y + 1)[:, None]
-    square = 1.0 - ((x * table.spacing[0]) ** 2 + (y * table.spacing[1]) ** 2) / k**2
-    cosine = np.sqrt(np.maximum(square, 0.0))
-    cosine[last_y, last_x] = 0.0
+    q = np.hypot(x * table.spacing[0], y * table.spacing[1])
+    cosine = np.sqrt(np.maximum(1.0 - (q / k) ** 2, 0.0))
+    # orders on the edge of the band are in it, and order 0 never
+    turns = q / (2.0 * np.pi)
+    cosine[(q == 0.0) | (turns * band[1] < 0.999) | (turns * band[0] > 1.001)] = 0.0
     steps = max(_FEWEST_STEPS, math.ceil(_PER_PERIOD * k * table.expansion.half_range / math.pi))
     share = 0.0
     for n, w in enumerate(np.linspace(1.0, 2.0, steps + 1)):

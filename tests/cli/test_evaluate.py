@@ -46,6 +46,31 @@ def test_picture_and_numbers_are_written_and_the_period_is_found(run, heights, h
         assert image.size[0] > 500
 
 
+@pytest.mark.parametrize(("period", "repeats", "blaze", "phase"), [
+    (1.6, 4.0, 10.0, 0.02), (1.6, 4.0, 10.0, 0.3), (1.0, 4.0, -8.0, 0.5), (3.0, 4.3, 10.0, 0.02),
+    (3.0, 4.3, 5.0, 0.3),
+])  # fmt: skip
+def test_few_periods_of_a_blazed_grating_are_within_their_error(
+    run, here, period, repeats, blaze, phase
+):
+    """The jumps at a scan's edges move the maxima, by up to 3 % of the period."""
+    pixel = period / 32
+    x = np.arange(round(repeats * 32)) / 32 + phase
+    facets = (x % 1.0 - 0.5) * period * np.tan(np.radians(blaze))
+    noise = np.random.default_rng(0).normal(0.0, 0.001, (x.size, x.size))
+    np.save("blazed.npy", facets + noise)
+    asked = ("--pixel-size", f"{pixel}", "--step", "25", "--angle-step", "0.2", "--positions", "2")
+    ran = run("evaluate", "blazed.npy", *asked).succeeded()
+    with np.load("blazed-evaluation.npz") as saved:
+        fitted, error = float(saved["fitted_period"]), float(saved["fit_error"])
+    # two standard errors
+    assert abs(fitted - period) < 2.0 * error
+    assert error < 0.1 * period
+    line = next(line for line in ran.out.splitlines() if "window positions" in line)
+    mean, spread = line.split(": ")[1].split(" nm")[0].split(" ± ")
+    assert abs(float(mean) - 1e3 * period) < 2.0 * float(spread)
+
+
 def test_a_surface_of_a_material_is_the_reference_s(run, heights):
     run("evaluate", heights, *EXACT, *QUICK[:-1], "0", "--material", "keratin").succeeded()
     patch = md.HeightField(np.load(heights), 0.08, periodic=True)

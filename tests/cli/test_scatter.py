@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.columns import read_columns
+from mitsuba_diffraction.heights import gratings
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -43,7 +44,7 @@ def test_a_spectrum_that_no_model_fits_has_none_and_a_wrong_wavelength_is_named(
     np.save("waves.npy", np.tile(waves, (192, 1)))
     asked = ("scatter", "waves.npy", "--pixel-size", "0.2", "--periodic", "exact")
     ran = run(*asked, "--json", "figures.json").succeeded()
-    assert "no ABg model fits" in ran.out
+    assert "no ABg model: " in ran.out
     row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
     assert row["a"] is row["error"] is None
     for wrong in ("0.5", "200000"):
@@ -61,12 +62,57 @@ def test_grooves_finer_than_the_wavelength_scatter_no_light(run, here):
     assert row["tis_table"] < 1e-9
 
 
-@pytest.mark.parametrize(("slope", "said"), [(0.012, False), (0.1, True)])
-def test_the_tilt_of_a_mirror_is_levelled_or_said(run, here, slope, said):
+@pytest.mark.parametrize("form", ["tilt", "facet", "bow"])
+def test_the_form_of_a_mirror_is_named_and_no_roughness(run, here, form):
     smooth = rough_patch((64, 64), (0.3, 0.3), 0.0005).heights
-    np.save("mirror.npy", smooth + slope * 0.3 * np.arange(64))
-    asked = ("scatter", "mirror.npy", "--pixel-size", "0.3", "--json", "figures.json")
-    ran = run(*asked).succeeded()
-    assert ("--level plane" in ran.err) is said, ran.err
+    x = 0.3 * np.arange(64)
+    forms = {"tilt": 0.012 * x, "facet": 0.1 * x, "bow": 0.001 * (x - 9.6) ** 2}
+    rows = []
+    for heights in smooth, smooth + forms[form]:
+        np.save("mirror.npy", heights)
+        asked = ("scatter", "mirror.npy", "--pixel-size", "0.3", "--json", "figures.json")
+        ran = run(*asked).succeeded()
+        rows.append(json.loads((here / "figures.json").read_text())["wavelengths"][0])
+    assert "removed: it " in ran.out
+    for name in ("rms_um", "tis_rayleigh_rice", "tis_table"):
+        # of heights in which the form has been rounded
+        assert rows[1][name] == pytest.approx(rows[0][name], rel=1e-3)
+
+
+def test_form_stays_where_another_level_is_asked_for(run, here):
+    np.save("bow.npy", np.tile(0.001 * (0.3 * np.arange(64) - 9.6) ** 2, (64, 1)))
+    asked = ("scatter", "bow.npy", "--pixel-size", "0.3", "--level", "plane")
+    assert "paraboloid" not in run(*asked).succeeded().out
+
+
+@pytest.mark.parametrize("bow", [0.0, 0.04])
+@pytest.mark.parametrize("shape", [(60, 600), (400, 400)])
+def test_scatter_by_theory_and_table_is_of_one_band(run, here, shape, bow):
+    """Each octave of a spectrum f⁻² scatters alike, also what no window tells from the form."""
+    noise = gratings.rough(160.0, 1600, rms=0.02, correlation=1e4, slope=2.0).heights
+    (ny, nx), y = shape, np.linspace(-0.5, 0.5, shape[0])[:, None]
+    np.save("scan.npy", noise[:ny, :nx] + bow * y**2)
+    asked = ("scatter", "scan.npy", "--pixel-size", "0.1", "--json", "figures.json")
+    run(*asked).succeeded()
     row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
-    assert (row["tis_table"] < 1e-3) is not said
+    # the table's windows weigh places of the scan otherwise than the one of the spectrum: 1 to 12 %
+    # of eight such scans
+    assert row["tis_table"] == pytest.approx(row["tis_rayleigh_rice"], rel=0.15)
+    # cosθ lessens the scatter by a few per cent
+    whole = (4 * np.pi * row["rms_um"] / 0.6328) ** 2
+    assert 0.8 * whole < row["tis_rayleigh_rice"] < whole
+
+
+@pytest.mark.parametrize(("heights", "why"), [
+    (np.zeros((40, 40)), "flat"), (rough_patch((16, 16), (0.1, 0.1), 0.003).heights, "ring"),
+])  # fmt: skip
+def test_scatter_without_an_abg_model_is_told(run, here, heights, why):
+    np.save("scan.npy", heights)
+    asked = ("scatter", "scan.npy", "--pixel-size", "0.1", "--json", "figures.json")
+    ran = run(*asked).succeeded()
+    assert not ran.err
+    assert "no ABg model: " in ran.out
+    assert why in ran.out
+    row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
+    assert row["a"] is None
+    assert (row["tis_table"] > 0.0) is (row["tis_rayleigh_rice"] > 0.0) is bool(heights.any())

@@ -169,7 +169,7 @@ class Fit:
     """Period of the grating equation that fits a ridge, and how well it fits."""
 
     period: float  # µm
-    error: float  # standard error, µm, of scatter about the fit and of the lobe's slope
+    error: float  # standard error, µm: scatter about the fit, and biases of the maxima
     residual: float  # RMS difference of ridge and grating equation, degrees
     largest: float  # largest difference, degrees
     points: int  # number of maxima
@@ -340,11 +340,13 @@ def fit_period(ridge: Ridge) -> Fit:
 
 
 def _error(ridge: Ridge, abscissa: Real, u: Real, period: float) -> float:
-    """Return the error of a period fitted to u over mλ, µm, the quadratic sum of two.
+    """Return the error of a period fitted to u over mλ, µm: scatter, and two biases, which add up.
 
     Scatter: the standard error of the slope u over mλ (least squares). Slope: where the brightness
     changes with u, the maximum of a Gaussian lobe of variance s² is shifted by s² d(ln f)/du; the
-    gradient is that along the ridge.
+    gradient is that along the ridge. Offset: light of other orders, which a window of few periods
+    leaves beneath the lobe, and a tilt shift u alike at all wavelengths, so that the line through
+    the maxima misses 0; the fit takes that for a slope.
     """
     fitted, response = ridge.has_maximum, ridge.response
     rest = u - abscissa / period
@@ -352,4 +354,7 @@ def _error(ridge: Ridge, abscissa: Real, u: Real, period: float) -> float:
     # σ_u² of exp(−σ²k²Δu²)
     variance = 0.5 / (response.sigma * wavenumber(response.wavelengths[fitted])) ** 2
     gradient = float(np.polyfit(u, np.log(ridge.heights[fitted]), 1)[0])
-    return period * math.hypot(scatter, gradient * float(np.mean(variance / u)))
+    slope = abs(gradient * float(np.mean(variance / u)))
+    offset = abs(float(np.polyfit(abscissa, u, 1)[1])) * period
+    offset *= float(abscissa.sum() / (abscissa @ abscissa))
+    return period * math.hypot(scatter, slope + offset)

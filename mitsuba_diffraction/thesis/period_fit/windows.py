@@ -52,6 +52,12 @@ class WindowFits:
         return float(self.periods.std(ddof=1)) if self.periods.size > 1 else 0.0
 
     @property
+    def total(self) -> float:
+        """Standard deviation of one window's period, µm: between windows, and of each fit."""
+        of_fits = [fit.error for fit in self.fits if fit is not None]
+        return math.hypot(self.spread, sum(of_fits) / len(of_fits))
+
+    @property
     def error(self) -> float:
         """Standard error of the patch's mean period, from the spread between windows, µm."""
         return self.spread / math.sqrt(self.independent)
