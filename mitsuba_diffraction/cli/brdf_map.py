@@ -280,12 +280,8 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
 def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     parameters = options.table_options(args, tuple(_TABLE)) | surface_parameters(args)
-    if args.preset is None:
-        kind = kind_of(args.source)
-        if kind is FileKind.ORDERS:
-            options.refuse_of_table(args, args.source, OF_ORDERS)
-        elif kind is FileKind.TABLE:
-            options.refuse_of_table(args, args.source, ["ext_ior"])
+    own = {FileKind.ORDERS: OF_ORDERS, FileKind.TABLE: ("ext_ior",)}
+    options.refuse_of_table(args, args.preset or args.source, own.get(kind_of(args.source), ()))
     if (index := medium_index(args.ext_ior)) != 1.0:
         parameters["lateral_scale"] = index
         parameters["height_scale"] = index * (args.height_scale or 1.0)

@@ -51,6 +51,7 @@ REFUSED = {
         "t.exr --resolution 8 --step 100 -m llvm_ad_mono": "variant 'llvm_ad_mono'",
         "nothing.png": "nothing.png",
         "--preset dvdd": "did you mean dvd",
+        "--preset cd --material gold": "'cd' is a table, which has its own; leave --material out",
         "noise.npy --pixel-size 0.08 --method rainbow": "needs a period",
         "grating.npy --pixel-size 0.08 --method rainbow --relative": "no relative reflectance",
         "grating.npy --resolution 8": "give --pixel-size in µm, for instance --pixel-size 0.05",
