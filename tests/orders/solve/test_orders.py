@@ -145,7 +145,9 @@ def test_the_error_compares_with_new_solutions(table):
         (lambda: md.solve_orders(WALLS, "1.5", settings=Settings(polarised=True), block=True),
          "efficiencies alone"),
         # crossed gratings
-        (lambda: md.solve_orders(flat(2.0)), "four times the shortest wavelength"),
+        (lambda: md.solve_orders(flat(2.0)), "4 times the shortest wavelength"),
+        (lambda: md.solve_orders(HeightField(20.0 * np.eye(4), 0.1), 1.5),
+         "heights.* are 20 µm.* in µm"),
         (lambda: md.solve_orders(flat(0.1), "none"), "perfect conductors"),
         (lambda: md.solve_orders(flat(0.1), "glas"), "material"),
         (lambda: md.solve_orders(flat(0.1), 1.5, thin=True), "leave out"),
