@@ -51,9 +51,10 @@ OF_ORDERS = (
     *(name for name in _SURFACE if name != "orientation"),
     *(name for name in _TABLE if name != "coherence_width"), *options.HEIGHTS,
 )  # fmt: skip
-# Options that only the renderer's BSDF has.
+# Options that only the renderer's BSDF has; methods are in daylight.
 _OF_THE_BSDF = (
     "mode", *(name for name in _SURFACE if name != "int_ior"), "basis", "preset", "spectral",
+    "illuminant",
 )  # fmt: skip
 
 
@@ -273,8 +274,6 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
         return
     options.refuse(args, _OF_THE_BSDF, ": not allowed with argument --method")
     options.refuse_unused(args)
-    if args.illuminant != "D65":
-        args.parser.error("argument --method: is under --illuminant D65 only")
 
 
 def surface_bsdf(args: argparse.Namespace) -> Any:

@@ -25,6 +25,9 @@ from .table import OrderTable
 #: which light is the listed one.
 _SAME, _SAME_WAVELENGTH = 4e-6, 1e-6
 
+#: Steps of θ, degrees, up to which light between listed directions is not warned of.
+WIDEST_STEP = 10.0
+
 
 class Lights(NamedTuple):
     """Response of a grid of lights.
@@ -240,7 +243,7 @@ def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
 
 
 def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
-    """Warn of light, from θ (b,) and φ (c,), degrees, beyond all directions of a list."""
+    """Warn of light, from θ (b,) and φ (c,), degrees, beyond a list's directions or in its gaps."""
     response = table.response
     if not isinstance(response, ListedResponse):
         return
@@ -254,9 +257,17 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
     if response.in_plane:
         within &= np.isin(turned, (0.0, 180.0))
     within = (within | (steep == 0.0)) & (steep >= polar[0] - near) & (steep <= polar[-1] + near)
-    if within.all():
-        return
     listed = table.directions
+    if within.all():
+        apart = _gaps(polar, steep)
+        if (apart > WIDEST_STEP + near).any():
+            n = int(apart.argmax())
+            warn(
+                f"theta {steep[n]:g}° is between the table's directions, {apart[n]:g}° apart: such "
+                f"light gets efficiencies in between; list theta in steps of {WIDEST_STEP:g}° or "
+                "less"
+            )
+        return
     places = [np.concatenate(canonical([t], [p], table.crossed), axis=-1)[0] for t, p in listed]
     nearest = KDTree(_unit(np.array(places))).query(_unit(asked[~within]))[1]
     named = ["theta {:g}°, phi {:g}°".format(*listed[n]) for n in np.unique(nearest)]
@@ -266,6 +277,14 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
         f"theta {t:g}°, phi {p:g}° is outside the table's directions: such light gets the "
         f"efficiencies of the nearest, {' or '.join(named[:3])}{' …' if named[3:] else ''}"
     )
+
+
+def _gaps(axis: Real, asked: Real) -> Real:
+    """Return the distances of the nodes of an axis (n,) around each angle (m,); 0 at a node."""
+    near = 10.0**-DIGITS
+    below, above = np.searchsorted(axis + near, asked), np.searchsorted(axis - near, asked)
+    nodes = np.pad(axis, 1, mode="edge")
+    return np.where(below < above, 0.0, nodes[above + 1] - nodes[below])
 
 
 def _unit(directions: Real) -> Real:

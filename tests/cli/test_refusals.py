@@ -247,7 +247,7 @@ USAGE = {
         "--preset dvd": "SOURCE or --preset",
         "--method flss --material Al": "--material: not allowed with",
         "--method flss --spectral": "--spectral: not allowed with",
-        "--method flss --illuminant E": "under --illuminant D65 only",
+        "--method flss --illuminant E": "--illuminant: not allowed with argument --method",
         "--method flss --int-ior 1.5": "only for --relative",
         "--method rainbow": "argument --step: has no effect with --method rainbow",
         "--relative": "--relative: only with argument --method",
