@@ -13,8 +13,6 @@ from ..errors import warn
 from .polarised import nearest_jones
 from .response import (
     DIGITS,
-    STEEPEST,
-    WIDEST_GAP,
     ListedResponse,
     canonical,
     orders_between,
@@ -216,24 +214,16 @@ def _filled(
     return flat.reshape(values.shape)
 
 
-def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
+def warn_of_gaps(table: OrderTable, shown: str) -> None:
     """Warn of directions that a list lacks."""
     response = table.response
     assert isinstance(response, ListedResponse)
-    theta, phi = canonical(lights.theta, lights.phi, table.crossed)
-    bearings = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
-    if table.crossed:
-        if np.diff(bearings, append=bearings[0] + 360.0).max() > WIDEST_GAP:
-            warn(
-                f"{shown} has no light from some azimuths, which get the efficiencies of the "
-                "nearest direction in it; list phi from 0 to 345 in steps of 15"
-            )
-        return
-    sides = {0.0, 180.0} <= set(bearings.tolist())
-    if theta.max() < STEEPEST or not sides:
+    if len(table.directions) == 1 or response.lacks_directions(table.crossed):
+        azimuths = ", and phi from 0 to 345 in steps of 15," if table.crossed else ""
         warn(
             f"{shown} has no light from some directions, which get the efficiencies of the nearest "
-            "direction in it; list theta from -85 to 85 in steps of 5 or 10 to have all of them"
+            f"direction in it; list theta from -85 to 85 in steps of 5 or 10{azimuths} to have all "
+            "of them"
         )
     elif response.in_plane:
         warn(

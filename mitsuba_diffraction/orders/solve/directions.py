@@ -143,7 +143,7 @@ def solve_directions(
         made = replace(made, response=replace(made.response, index=clear))
         header |= measured_error(made, chosen.problem, work).facts()
         warn_of_error(header)
-    warn_of_gaps(made, table, f"the table of {grating.profile.name}")
+    warn_of_gaps(made, f"the table of {grating.profile.name}")
     return replace(made, header=header | {"processor_seconds": round(work.processor_seconds, 1)})
 
 
