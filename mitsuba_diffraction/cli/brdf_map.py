@@ -51,9 +51,10 @@ OF_ORDERS = (
     *(name for name in _SURFACE if name != "orientation"),
     *(name for name in _TABLE if name != "coherence_width"), *options.HEIGHTS,
 )  # fmt: skip
-# Options that only the renderer's BSDF has.
+# Options that only the renderer's BSDF has; methods are in daylight.
 _OF_THE_BSDF = (
     "mode", *(name for name in _SURFACE if name != "int_ior"), "basis", "preset", "spectral",
+    "illuminant",
 )  # fmt: skip
 
 
@@ -273,19 +274,13 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
         return
     options.refuse(args, _OF_THE_BSDF, ": not allowed with argument --method")
     options.refuse_unused(args)
-    if args.illuminant != "D65":
-        args.parser.error("argument --method: is under --illuminant D65 only")
 
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
     """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     parameters = options.table_options(args, tuple(_TABLE)) | surface_parameters(args)
-    if args.preset is None:
-        kind = kind_of(args.source)
-        if kind is FileKind.ORDERS:
-            options.refuse_of_table(args, args.source, OF_ORDERS)
-        elif kind is FileKind.TABLE:
-            options.refuse_of_table(args, args.source, ["ext_ior"])
+    own = {FileKind.ORDERS: OF_ORDERS, FileKind.TABLE: ("ext_ior",)}
+    options.refuse_of_table(args, args.preset or args.source, own.get(kind_of(args.source), ()))
     if (index := medium_index(args.ext_ior)) != 1.0:
         parameters["lateral_scale"] = index
         parameters["height_scale"] = index * (args.height_scale or 1.0)

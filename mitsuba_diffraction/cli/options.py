@@ -271,11 +271,14 @@ def refuse_others(args: argparse.Namespace, names: Iterable[str], why: str) -> N
     refuse(args, sorted(args.given - {*_GENERAL, *REPLACED, *names}), why)
 
 
-def refuse_of_table(args: argparse.Namespace, file: Path, names: Iterable[str]) -> None:
-    """Refuse the first option whose value a table has in itself, with a DiffractionError."""
+def refuse_of_table(args: argparse.Namespace, shown: Path | str, names: Iterable[str]) -> None:
+    """Refuse the first option whose value a table has in itself, with a DiffractionError.
+
+    shown : the table's file, or a preset's name.
+    """
     for name in given(args, names):
         raise DiffractionError(
-            f"'{file}' is a table, which has its own; leave {option_of(args, name)} out, or give "
+            f"'{shown}' is a table, which has its own; leave {option_of(args, name)} out, or give "
             "heights"
         )
 

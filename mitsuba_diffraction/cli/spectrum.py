@@ -169,11 +169,14 @@ def run(args: argparse.Namespace) -> Figures:
         )
     for name, each in spectra.items():
         if 100.0 * each.value.max() < _NOTHING:
-            say(
-                f"{name or title}: every column is below {_NOTHING:g} %: no order of the surface "
-                "enters a detector; try --azimuth auto, across the strongest grating's grooves, or "
-                "a range of detectors (--detector -60:60:5)"
+            why = (
+                "the surface reflects no light in the mirror direction; is its index, --material "
+                "or --int-ior, that of the medium around it?"
+                if args.light in detectors
+                else "no order of the surface enters a detector; try --azimuth auto, across the "
+                "strongest grating's grooves, or a range of detectors (--detector -60:60:5)"
             )
+            say(f"{name or title}: every column is below {_NOTHING:g} %: {why}")
     columns = {
         column: values.tolist()
         for name, each in spectra.items() for column, values in each.columns(name).items()

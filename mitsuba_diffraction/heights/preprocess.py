@@ -113,7 +113,7 @@ def fill_missing(heights: Real, method: str | None, name: str) -> tuple[Real, st
     if method is None:
         raise DiffractionError(
             f"{name}: {share} have no height (NaN, infinite or masked); fill them, "
-            f"fill={' or fill='.join(FILLS)}, or keep a middle without them: crop, in µm"
+            f"fill={' or fill='.join(FILLS)}, or keep a middle without them, crop=W,H in µm"
         )
     if count > LARGEST_SHARE * heights.size:
         raise DiffractionError(f"{name}: {share} have no height, too many to fill; crop the patch")

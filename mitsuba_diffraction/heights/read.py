@@ -204,7 +204,7 @@ def _read(file: Path, kind: FileKind, channel: str | int | None) -> tuple[RawHei
         return read_instrument(file, channel), True
     if channel is not None:
         raise DiffractionError(
-            f"{str(file)!r} has no channels to choose from; leave channel {channel!r} out"
+            f"{str(file)!r} has no channels to choose from; leave channel={channel} out"
         )
     return _READERS[kind](file), False
 

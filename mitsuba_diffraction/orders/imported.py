@@ -65,7 +65,7 @@ def imported_table(
         table = _sheet(listed_response(lights, periods, superstrate), periods, ends, header)
     else:
         table = listed_table(lights, periods, header, superstrate=superstrate)
-    warn_of_gaps(table, lights, shown)
+    warn_of_gaps(table, shown)
     header |= _errors(table, grid, orders, values)
     if header["reciprocity_error"] > _ONE_WAY:
         warn(

@@ -13,8 +13,6 @@ from ..errors import warn
 from .polarised import nearest_jones
 from .response import (
     DIGITS,
-    STEEPEST,
-    WIDEST_GAP,
     ListedResponse,
     canonical,
     orders_between,
@@ -24,6 +22,9 @@ from .table import OrderTable
 #: Differences of directions (twice `polarised.MIN_ANGLE`), and relative ones of wavelengths, within
 #: which light is the listed one.
 _SAME, _SAME_WAVELENGTH = 4e-6, 1e-6
+
+#: Steps of θ, degrees, up to which light between listed directions is not warned of.
+WIDEST_STEP = 10.0
 
 
 class Lights(NamedTuple):
@@ -213,24 +214,16 @@ def _filled(
     return flat.reshape(values.shape)
 
 
-def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
+def warn_of_gaps(table: OrderTable, shown: str) -> None:
     """Warn of directions that a list lacks."""
     response = table.response
     assert isinstance(response, ListedResponse)
-    theta, phi = canonical(lights.theta, lights.phi, table.crossed)
-    bearings = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
-    if table.crossed:
-        if np.diff(bearings, append=bearings[0] + 360.0).max() > WIDEST_GAP:
-            warn(
-                f"{shown} has no light from some azimuths, which get the efficiencies of the "
-                "nearest direction in it; list phi from 0 to 345 in steps of 15"
-            )
-        return
-    sides = {0.0, 180.0} <= set(bearings.tolist())
-    if theta.max() < STEEPEST or not sides:
+    if len(table.directions) == 1 or response.lacks_directions(table.crossed):
+        azimuths = ", and phi from 0 to 345 in steps of 15," if table.crossed else ""
         warn(
             f"{shown} has no light from some directions, which get the efficiencies of the nearest "
-            "direction in it; list theta from -85 to 85 in steps of 5 or 10 to have all of them"
+            f"direction in it; list theta from -85 to 85 in steps of 5 or 10{azimuths} to have all "
+            "of them"
         )
     elif response.in_plane:
         warn(
@@ -240,7 +233,7 @@ def warn_of_gaps(table: OrderTable, lights: Lights, shown: str) -> None:
 
 
 def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
-    """Warn of light, from θ (b,) and φ (c,), degrees, beyond all directions of a list."""
+    """Warn of light, from θ (b,) and φ (c,), degrees, beyond a list's directions or in its gaps."""
     response = table.response
     if not isinstance(response, ListedResponse):
         return
@@ -254,9 +247,17 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
     if response.in_plane:
         within &= np.isin(turned, (0.0, 180.0))
     within = (within | (steep == 0.0)) & (steep >= polar[0] - near) & (steep <= polar[-1] + near)
-    if within.all():
-        return
     listed = table.directions
+    if within.all():
+        apart = _gaps(polar, steep)
+        if (apart > WIDEST_STEP + near).any():
+            n = int(apart.argmax())
+            warn(
+                f"theta {steep[n]:g}° is between the table's directions, {apart[n]:g}° apart: such "
+                f"light gets efficiencies in between; list theta in steps of {WIDEST_STEP:g}° or "
+                "less"
+            )
+        return
     places = [np.concatenate(canonical([t], [p], table.crossed), axis=-1)[0] for t, p in listed]
     nearest = KDTree(_unit(np.array(places))).query(_unit(asked[~within]))[1]
     named = ["theta {:g}°, phi {:g}°".format(*listed[n]) for n in np.unique(nearest)]
@@ -266,6 +267,14 @@ def warn_of_other_directions(table: OrderTable, theta: Real, phi: Real) -> None:
         f"theta {t:g}°, phi {p:g}° is outside the table's directions: such light gets the "
         f"efficiencies of the nearest, {' or '.join(named[:3])}{' …' if named[3:] else ''}"
     )
+
+
+def _gaps(axis: Real, asked: Real) -> Real:
+    """Return the distances of the nodes of an axis (n,) around each angle (m,); 0 at a node."""
+    near = 10.0**-DIGITS
+    below, above = np.searchsorted(axis + near, asked), np.searchsorted(axis - near, asked)
+    nodes = np.pad(axis, 1, mode="edge")
+    return np.where(below < above, 0.0, nodes[above + 1] - nodes[below])
 
 
 def _unit(directions: Real) -> Real:

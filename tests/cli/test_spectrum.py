@@ -52,6 +52,14 @@ def test_a_single_wavelength_is_measured_of_heights_too(run, scans):
     assert read("one.csv")["wl"].tolist() == 633.0
 
 
+def test_a_surface_without_light_has_the_reason_that_suits_its_detectors(run, scans):
+    """Its index is the medium's where the mirror direction is dark; else orders may miss it."""
+    bare = *PIXEL, *QUICK, "--ext-ior", "1.5", "--int-ior", "1.5"
+    assert "--int-ior" in run("spectrum", scans / "scan0.npy", *bare, "-o", "a.csv").err
+    away = run("spectrum", scans / "scan0.npy", *bare, "--detector", "75", "-o", "b.csv").err
+    assert "--azimuth auto" in away
+
+
 @pytest.mark.parametrize("asked", [("--height-scale", "2"), ("--coat-ior", "1.6")])
 def test_the_table_serves_the_heights_that_are_asked_for(run, scans, asked):
     run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, *asked, "-o", "scaled.csv").succeeded()

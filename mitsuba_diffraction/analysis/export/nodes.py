@@ -195,10 +195,12 @@ class Laid(NamedTuple):
     ----------
     values : (azimuths, polar, wavelengths), f in 1/sr, or f cosθo.
     light : of the same shape, share of the incident light at each node; its sum is reflected.
+    weights : (azimuths, polar), sr, ∫ cosθo dω about each node: `light` is f times it.
     """
 
     values: Real
     light: Real
+    weights: Real
 
 
 def laid(
@@ -269,7 +271,7 @@ def _values(nodes: Nodes, light: Real, weight: Real) -> Laid:
     values, light = values.reshape(shape), light.reshape(shape)
     if nodes.pole:
         values[:, 0], light[:, 0] = values[0, 0], light[0, 0] / nodes.azimuths
-    return Laid(values, light)
+    return Laid(values, light, weight.reshape(shape[:2]))
 
 
 def light_vectors(grid: ExportGrid) -> Real:

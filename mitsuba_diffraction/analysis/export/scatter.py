@@ -2,7 +2,8 @@
 
 JSON: universal BRDF format (Lanevski et al. 2022, Color Research and Application 47, 1177; layout:
 version 1.0 of the schema in github.com/BiRD-project/BiRD_view). CSV: a header line, then a line for
-each wavelength and pair of directions.
+each wavelength and pair of directions, with the weight, sr, by which f has to be summed over the
+eye's directions for the reflected share of the light: ∫ cosθ dω about the node.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ DEFAULT = ExportGrid(
     np.arange(0.0, 76.0, 15.0), np.arange(0.0, 360.0, 45.0), np.arange(400.0, 701.0, 50.0), 18
 )
 #: Columns of a CSV: the light's direction, then the eye's.
-CSV_COLUMNS = ("theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg", "wavelength_nm", "f_per_sr")
+CSV_COLUMNS = (
+    "theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg", "wavelength_nm", "f_per_sr",
+    "weight_sr",
+)  # fmt: skip
 # Nodes of φ of the eye over those of θ.
 _AZIMUTHS = 4
 _SCHEMA = (
@@ -47,7 +51,7 @@ def save_bird(
     """
     units = ("°", "°", "°", "°", "nm", "sr^-1")
     names = ("theta_i", "phi_i", "theta_r", "phi_r", "wavelength_i", "BRDF")
-    columns = _columns(bsdf, grid, progress).T
+    columns = _columns(bsdf, grid, progress).T[: len(names)]
     now = datetime.now(UTC)
     content = {
         "metadata": {
@@ -76,7 +80,7 @@ def save_csv(
 
 
 def _columns(bsdf: Any, grid: ExportGrid, progress: Progress) -> Real:
-    """Return θ and φ of the light, θ and φ of the eye, degrees, wavelength and f, (n, 6)."""
+    """Return θ and φ of the light and of the eye, degrees, wavelength, f and weight, (n, 7)."""
     n = grid.resolution
     grid.checked(_AZIMUTHS * n * n)
     grid = grid._replace(phi=np.unique(grid.phi % 360.0))
@@ -93,7 +97,9 @@ def _columns(bsdf: Any, grid: ExportGrid, progress: Progress) -> Real:
         axes = (step * np.arange(_AZIMUTHS * n), tilts, grid.wavelengths)
         phi_o, theta_o, lam = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
         sides = np.full(len(lam), theta), np.full(len(lam), phi)
-        blocks.append(np.column_stack([*sides, theta_o, phi_o, lam, of_light.values.ravel()]))
+        weights = np.repeat(of_light.weights.ravel(), grid.wavelengths.size)
+        values = of_light.values.ravel()
+        blocks.append(np.column_stack([*sides, theta_o, phi_o, lam, values, weights]))
     return np.concatenate(blocks)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...columns import read_columns
+from ...columns import Columns, read_columns
 from ...errors import DiffractionError, quoted, warn
 from ...limits import MOST_PIXELS
 from ..field import check_pixel_count
@@ -31,6 +31,7 @@ _SIZE = re.compile(
     re.IGNORECASE,
 )
 _OTHERS = (1e-4, 1e-3, 1e3, 1e4)  # µm in Å, nm, mm and cm
+_NUMBER = re.compile(r"[-+]?[\d.]+([eE][-+]?\d+)?")
 # "# Value units: nm", "# height in nm"
 _STATED = re.compile(
     r"[#;%\s\"]*+(?:(?:(?:Value|Height|Z) )?units?\s*+[:=]\s*+|(?:all |the )?(?:heights?|z)"
@@ -89,6 +90,7 @@ def read_text(path: Path) -> RawHeights:
 
     Heights are in µm unless a header line gives their unit, "Value units: nm", "units: nm",
     "Height [nm]" or "heights in nm"; "Width: 10 µm" and "Height: 10 µm" give the size of the patch.
+    Evenly spaced labels of columns and rows are left out.
     Empty cells and "nan" are points without data. Three columns are x, y and height, which have to
     form a regular grid, in which points may be missing; a line of names above them may give their
     units, µm without, and another order. Separators and decimal commas are as in `columns`.
@@ -111,7 +113,7 @@ def read_text(path: Path) -> RawHeights:
     stated, size = _read_header(table.header.values(), shown)
     points = nx == 3 and ny > 3 and size is None  # a header with sizes belongs to a grid
     if not points:
-        _refuse_names(table.header, shown)
+        _refuse_names(table)
     if nx < 2 or ny < 2:
         raise DiffractionError(
             f"{shown} holds {nx} x {ny} numbers, a line scan; a height field needs a map (ny, nx)"
@@ -138,35 +140,62 @@ def read_text(path: Path) -> RawHeights:
 def _without_labels(
     values: npt.NDArray[np.float64], shown: str
 ) -> tuple[npt.NDArray[np.float64], tuple[str, ...]]:
-    """Drop the labels 0, 1, 2, ... of columns and rows that pandas writes, and say so in a line.
+    """Drop the labels of columns and rows that pandas and spreadsheets write, and say so in a line.
 
     Raises a DiffractionError if either alone is there, which heights might be.
     """
-    row, column = (np.array_equal(v, np.arange(len(v))) for v in (values[0, 1:], values[1:, 0]))
-    if row and column and math.isnan(values[0, 0]):
-        line = "labels 0, 1, 2, ... of columns and rows, as pandas writes them, are left out"
+    if _are_labels(values[0, 1:], values[1:, 1:]) and _are_labels(values[1:, 0], values[1:, 1:].T):
+        line = (
+            f"evenly spaced labels of columns, {values[0, 1]:g} to {values[0, -1]:g}, and rows, "
+            f"{values[1, 0]:g} to {values[-1, 0]:g}, are left out; they give no pixel_size"
+        )
         warn(f"{shown}: {line}")
         return values[1:, 1:], (line,)
-    whole = np.isfinite(values) & (values == np.rint(values))
     for what, labels, others in (
-        ("line", values[0], whole[1:]), ("column", values[:, 0], whole[:, 1:]),
+        ("line", values[0], values[1:]), ("column", values[:, 0], values[:, 1:].T),
     ):  # fmt: skip
-        counts = len(labels) > 3 and np.array_equal(labels, np.arange(len(labels)))
-        if counts and not others.all(axis=None):
+        if _are_labels(labels, others):
             raise DiffractionError(
-                f"{shown}: the first {what} of numbers is 0, 1, 2, ... {len(labels) - 1}, labels "
-                f"and no heights; leave it out (pandas: to_csv(..., header=False, index=False))"
+                f"{shown}: the first {what} of numbers is {labels[0]:g}, {labels[1]:g}, "
+                f"{labels[2]:g}, ... {labels[-1]:g}, labels and no heights; leave it out (pandas: "
+                "to_csv(..., header=False, index=False))"
             )
     return values, ()
 
 
-def _refuse_names(header: dict[int, str], shown: str) -> None:
-    """Raise a DiffractionError for lines above a grid that are neither comment nor size."""
-    for place, line in header.items():
-        if line.lstrip()[0] not in "#%" and not (_SIZE.match(line) or _stated_unit(line)):
+def _are_labels(numbers: npt.NDArray[np.float64], others: npt.NDArray[np.float64]) -> bool:
+    """Whether numbers (n,) are evenly spaced, and the lines beside them, (m, n), in no such steps.
+
+    Heights of a ramp, a sawtooth or z = x y have lines of even or the same steps beside them.
+    """
+    if len(numbers) < 4 or not _are_even(step := np.diff(numbers)):
+        return False
+    steps = np.diff(others, axis=1)
+    usual = np.median(np.abs(steps[np.isfinite(steps)])) if np.isfinite(steps).any() else 0.0
+    alike = math.isclose(usual, abs(step.mean()), rel_tol=0.01)
+    return not alike and _are_even(steps).mean() < 0.5
+
+
+def _are_even(steps: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Whether steps (..., n) are the same and not 0; rounded numbers differ by 1 % of a step."""
+    mean = np.abs(steps.mean(axis=-1))
+    return np.asarray((mean > 0.0) & (np.ptp(steps, axis=-1) <= 0.01 * mean))
+
+
+def _refuse_names(table: Columns) -> None:
+    """Raise a DiffractionError for a line above a grid that names columns or has lost a number.
+
+    Comments and titles may be there.
+    """
+    for place, line in table.header.items():
+        if line.lstrip()[0] in "#%" or _SIZE.match(line) or _stated_unit(line):
+            continue
+        words = re.split(r"[\s,;]+", line.strip())
+        names = sum(map(bool, table.names)) > 1 and all(name in line for name in table.names)
+        if names or 2 * sum(map(bool, map(_NUMBER.fullmatch, words))) > len(words):
             raise DiffractionError(
-                f"{shown}, line {place}: {quoted(line)} is no row of numbers; expected a grid of "
-                "heights in µm (comments begin with '#')"
+                f"{table.shown}, line {place}: {quoted(line)} is no row of numbers; expected a "
+                "grid of heights in µm: delete this line, or begin it with #"
             )
 
 
@@ -241,8 +270,7 @@ def _from_points(
     if not once or min(xs.size, ys.size) < 2 or not np.isfinite(points[:, :2]).all():
         raise uneven
     steps = np.diff(xs), np.diff(ys)
-    # coordinates printed with few digits are rounded: up to 1 % of a step is uniform
-    if any(np.ptp(step) > 0.01 * step.mean() for step in steps):
+    if not all(map(_are_even, steps)):
         raise uneven
     grid = np.full((ys.size, xs.size), np.nan)
     grid[iy, ix] = points[:, 2]

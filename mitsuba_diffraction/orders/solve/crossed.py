@@ -26,8 +26,9 @@ from .stations import CrossedStation
 _ABSORBING = 1e-3
 #: Slices for each harmonic on a side.
 _SLICES = 3
-#: Longest period over the shortest wavelength: more orders take hours.
-_LONGEST = 4.0
+#: Longest period, and highest heights, over the shortest wavelength: more orders take hours, and
+#: slices of higher heights are thicker than fringes. Heights of 10 nm given as µm are higher.
+_LONGEST, _HIGHEST = 4.0, 20.0
 #: θ and φ of the directions that a table of all light has, degrees.
 THETA, PHI = np.linspace(0.0, 88.0, 12), np.arange(0.0, 360.0, 10.0)
 
@@ -124,17 +125,21 @@ def _transform(pixels: int, last: int) -> Complex:
 def check_cell(cell: UnitCell, material: TabulatedIndex, wavelengths: tuple[float, float]) -> None:
     """Refuse gratings that this solver cannot solve, and warn of metals.
 
-    Raises a DiffractionError for perfect conductors, and periods above four wavelengths.
+    Raises a DiffractionError for perfect conductors, and too long periods or high heights.
     """
     index = material.index(wavelengths)
     if index is None:
         raise DiffractionError("crossed gratings of perfect conductors are not solved; give Al")
-    longest = 1e-3 * _LONGEST * wavelengths[0]
-    if cell.period > longest:
-        raise DiffractionError(
-            f"periods={cell.periods[0]:g}, {cell.periods[1]:g} µm must be at most {longest:.3g} "
-            f"µm, four times the shortest wavelength, {wavelengths[0]:g} nm"
-        )
+    for what, length, times in (
+        ("periods", cell.period, _LONGEST), ("heights, lowest to highest,", cell.depth, _HIGHEST),
+    ):  # fmt: skip
+        most = 1e-3 * times * wavelengths[0]
+        if length > most:
+            raise DiffractionError(
+                f"crossed grating: {what} must be at most {most:.3g} µm, {times:g} times the "
+                f"shortest wavelength, {wavelengths[0]:g} nm, and are {length:.3g} µm; are all "
+                "lengths in µm?"
+            )
     if (np.abs(index.imag) > _ABSORBING).any():
         warn(
             f"{material.name} absorbs: coupled waves converge slowly on slopes of metal, some 4 % "

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Complex, Real
-from ...errors import DiffractionError
+from ...errors import DiffractionError, warn
 from ..listed import Lights, listed_table, mirror_of, warn_of_gaps
 from ..lists import check_light
 from ..polarised import ODD, mueller_of
@@ -68,6 +68,7 @@ def solve_directions(
     check_outline(periods, how.wavelengths, superstrate, grating.thin, block, listed=True)
     count = max(int(np.ceil((high - low) / lights.step - 1e-9)), 1) + 1 if high > low else 1
     lam = np.linspace(low, high, count)
+    _warn_of_fringes(grating, lam)
     polar, azimuth = (np.unique(np.asarray(angle, np.float64)) for angle in lights[:2])
     check_light(lam, polar, azimuth, "solve_orders")
     shape = lam.size, polar.size, azimuth.size
@@ -142,8 +143,20 @@ def solve_directions(
         made = replace(made, response=replace(made.response, index=clear))
         header |= measured_error(made, chosen.problem, work).facts()
         warn_of_error(header)
-    warn_of_gaps(made, table, f"the table of {grating.profile.name}")
+    warn_of_gaps(made, f"the table of {grating.profile.name}")
     return replace(made, header=header | {"processor_seconds": round(work.processor_seconds, 1)})
+
+
+def _warn_of_fringes(grating: Grating, lam: Real) -> None:
+    """Warn of layers whose fringes at the shortest wavelength have fewer than two of lam (n,)."""
+    (apart, line), step = grating.structure.fringes(lam[0]), float(np.diff(lam[:2]).sum())
+    if 2.0 * step > apart:
+        most = 0.5e-3 * lam[0] ** 2 / step
+        warn(
+            f"{line}, and wavelengths are {step:g} nm apart, between which efficiencies are "
+            f"interpolated; give step={0.5 * apart:.2g} or less, or layers of 2 Σ n d up to "
+            f"{most:.2g} µm"
+        )
 
 
 def _nearest_grazing(grating: Grating, x: Real, y: Real, waves: Real) -> int:

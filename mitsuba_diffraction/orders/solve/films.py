@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ...errors import DiffractionError, check_keys, quoted
 from ...files import read_toml
 from ...heights.lengths import count_between, number_between
@@ -18,6 +20,8 @@ Substance = str | float | complex | TabulatedIndex
 #: Layers, from the material upwards: material and thickness in µm. Slices, beneath a profile, are a
 #: thickness and parts, of a material and the x in µm at which it begins and ends.
 Layers = Sequence[tuple[Any, ...]]
+# Logarithm by which an opaque layer weakens the amplitude of light there and back, at least.
+_OPAQUE = 3.0
 
 
 class ProfileFilm(NamedTuple):
@@ -81,6 +85,26 @@ class Structure:
             lengths += [thickness, len(parts)]
             lengths += [end for part in parts for end in (part.begin, part.end)]
         return tuple(lengths)
+
+    def fringes(self, wavelength: float) -> tuple[float, str]:
+        """Return the distance of fringes of the layers, nm, infinite without, and a line on it.
+
+        Layers beneath an opaque one have none. wavelength : in vacuum, nm.
+        """
+        films = ((film.thickness, [film.material]) for film in reversed(self.films))
+        slices = ((each.thickness, [p.material for p in each.parts]) for each in self.slices[::-1])
+        path = 0.0
+        for thickness, materials in (*films, *slices):
+            indices = [complex(np.asarray(each.index(wavelength))) for each in materials]
+            index = max(indices, key=lambda n: n.real, default=1.0 + 0.0j)
+            path += 2.0 * thickness * index.real
+            if 4e3 * np.pi * thickness * index.imag > _OPAQUE * wavelength:
+                break
+        apart = 1e-3 * wavelength**2 / path if path else np.inf
+        return apart, (
+            f"2 Σ n d of the layers is {path:.3g} µm (thicknesses are in µm), with fringes "
+            f"{apart:.2g} nm apart at {wavelength:g} nm"
+        )
 
 
 def structure_of(

@@ -66,11 +66,12 @@ def node_counts(
     expected = float((shares * missed).sum() / shares.sum())
     if expected > _HOPELESS * how.tolerance:
         worst = int((shares * missed).argmax())
+        apart, line = grating.structure.fringes(how.wavelengths[0])
         raise DiffractionError(
             f"the tolerance of {how.tolerance:.2%} will not be reached: {tuple(counts[worst])} "
             f"nodes still miss {missed[worst]:.2%} of the light along lines across band {worst}, "
             f"all bands {expected:.2%}; use a tolerance of {min(expected, 0.2):.2g}, or fewer "
-            "wavelengths"
+            "wavelengths" + (f"; {line}" if apart < np.inf else "")
         )
     return counts
 

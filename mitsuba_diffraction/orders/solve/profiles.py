@@ -208,7 +208,7 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     """Read a line: two columns x and z in µm, or in the units and order that a header line names.
 
     Raises a DiffractionError if the file cannot be read, a line has no two numbers, or the line is
-    no `Profile`, or less than half a period.
+    no `Profile`, or x leaves a wider gap in the period than between any of its points.
     """
     if (kind := kind_of(path)) in (FileKind.IMAGE, FileKind.EXR, FileKind.NPY, FileKind.JPEG):
         raise DiffractionError(
@@ -231,10 +231,14 @@ def read_profile(path: str | os.PathLike[str], period: float) -> Profile:
     lengths = table.finite((0, 1), what) * np.array(factors, np.float64)
     x, z = lengths[:, table.order("x")].T
     x = x - x.min()
-    if len(x) > 2 and x.max() < 0.5 * period:
+    # the side that closes the period may be as long as the longest listed one; a line sampled
+    # over a nominal period may lack a point more
+    longest = np.abs(np.diff(x)).max(initial=0.0)
+    widest = max(longest, min(2.0 * longest, 0.1 * period)) + 1e-6 * period
+    if len(x) > 2 and period - x.max() > widest:
         raise DiffractionError(
             f"'{path}': x covers {x.max():g} µm of a period of {period:g} µm; give one whole "
-            "period, in µm, or the right length of the period"
+            "period, in µm, with the point that ends it, or the right length of the period"
         )
     # the end of a period is the beginning of the next
     if len(x) > 2 and abs(x[-1] - period) < 1e-6 * period and abs(z[-1] - z[0]) < 1e-6 * period:

@@ -233,18 +233,48 @@ def test_points_without_a_height_are_gaps(tmp_path, gap):
     assert field.heights[2, 3] == 23.0
 
 
-def test_labels_of_rows_and_columns_are_no_heights(tmp_path):
+@pytest.mark.parametrize("corner", ["", "0", "-0.05"])
+@pytest.mark.parametrize("step", [1.0, 0.05, -0.0488])
+def test_labels_of_rows_and_columns_are_no_heights(tmp_path, corner, step):
+    """As pandas writes an index, and spreadsheets x and y, rounded to few digits."""
     heights = np.random.default_rng(1).random((5, 6)).round(3)
     rows = [",".join(map(str, row)) for row in heights]
-    labelled = [",0,1,2,3,4,5", *(f"{n},{row}" for n, row in enumerate(rows))]
+    names = ",".join(f"{step * n:.4g}" for n in range(6))
+    labelled = [f"{corner},{names}", *(f"{step * n:.4g},{row}" for n, row in enumerate(rows))]
     file = tmp_path / "a.csv"
     file.write_text("\n".join(labelled), "utf-8")
     with pytest.warns(DiffractionWarning, match="labels"):
         field = HeightField.load(file, pixel_size=5.0, level="none")
     assert np.array_equal(field.heights, heights[::-1])
-    for part in (["0,1,2,3,4,5", *rows], labelled[1:]):
+    for part in ([names, *rows], labelled[1:]):
         file.write_text("\n".join(part), "utf-8")
         assert "labels" in refusal(file, pixel_size=5.0)
-    ramp = np.add.outer(np.arange(5), np.arange(6))
-    np.savetxt(file, ramp, "%g", ",")
-    assert HeightField.load(file, pixel_size=5.0, level="none").range == 9.0
+
+
+X, Y = np.meshgrid(np.arange(6.0), np.arange(5.0))
+
+
+@pytest.mark.parametrize(
+    "heights", [X + Y, X * Y, (X + Y) % 6, np.round(X * Y**2), np.where(Y == 0, X, (X + Y) % 4)]
+)
+def test_ramps_and_sawteeth_are_no_labels(tmp_path, heights):
+    np.savetxt(tmp_path / "a.csv", heights, "%g", ",")
+    field = HeightField.load(tmp_path / "a.csv", pixel_size=5.0, level="none")
+    assert np.array_equal(field.heights, heights[::-1])
+
+
+def test_a_title_above_a_grid_is_no_row_of_it(tmp_path):
+    file = tmp_path / "a.csv"
+    file.write_text("Sample A,,,,\nScan 3 of 2024-05-01\nHeight [nm]\n1,2,3,5\n4,5,6,9\n", "utf-8")
+    field = HeightField.load(file, pixel_size=5.0, level="none")
+    np.testing.assert_allclose(field.heights[0], [4e-3, 5e-3, 6e-3, 9e-3])
+
+
+@pytest.mark.parametrize("line", ["1,2,?,5", "a,b,c,d", "y/x,0,5,10,15", "1,2,?"])
+def test_names_of_columns_and_damaged_rows_say_what_to_do(tmp_path, line):
+    file = tmp_path / "a.csv"
+    file.write_text(f"{line}\n1,2,3,5\n4,5,6,9\n", "utf-8")
+    assert "line 1: " in (told := refusal(file, pixel_size=5.0))
+    assert told.endswith("delete this line, or begin it with #")
+    file.write_text(f"# {line}\n1,2,3,5\n4,5,6,9\n", "utf-8")
+    assert HeightField.load(file, pixel_size=5.0).shape == (2, 4)

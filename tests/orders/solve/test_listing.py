@@ -126,10 +126,10 @@ def test_jones_matrices_have_the_efficiencies_of_s_and_p():
     [
         (45.0, 0.0, "theta 20°, phi 0°"), (-45.0, 0.0, "theta 20°, phi 180°"),
         (20.0, 30.0, "theta 20°, phi 0°"), (-20.0, 360.0, None), (20.0, 180.0, None),
-        (10.0, 0.0, None),
+        (0.0, 0.0, None), (10.0, 0.0, "theta 10° is between"), (-10.0, 0.0, "20° apart"),
     ],
 )  # fmt: skip
-def test_light_outside_the_directions_of_a_list_is_warned_of(theta, phi, nearest):
+def test_light_outside_and_far_between_the_directions_of_a_list_is_warned_of(theta, phi, nearest):
     table = listed_grating()  # warns of its directions itself
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

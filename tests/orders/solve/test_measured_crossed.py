@@ -53,7 +53,7 @@ def test_lines_without_the_ratio_of_cosines_are_warned_of(grid, tmp_path):
 
 
 def test_a_lack_of_azimuths_is_warned_of(tmp_path):
-    with pytest.warns(DiffractionWarning, match="some azimuths"):
+    with pytest.warns(DiffractionWarning, match="phi from 0 to 345"):
         imported(crossed.listed(THETA, np.array([0.0, 90.0]), WAVES), tmp_path)
 
 

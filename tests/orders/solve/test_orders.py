@@ -145,7 +145,9 @@ def test_the_error_compares_with_new_solutions(table):
         (lambda: md.solve_orders(WALLS, "1.5", settings=Settings(polarised=True), block=True),
          "efficiencies alone"),
         # crossed gratings
-        (lambda: md.solve_orders(flat(2.0)), "four times the shortest wavelength"),
+        (lambda: md.solve_orders(flat(2.0)), "4 times the shortest wavelength"),
+        (lambda: md.solve_orders(HeightField(20.0 * np.eye(4), 0.1), 1.5),
+         "heights.* are 20 µm.* in µm"),
         (lambda: md.solve_orders(flat(0.1), "none"), "perfect conductors"),
         (lambda: md.solve_orders(flat(0.1), "glas"), "material"),
         (lambda: md.solve_orders(flat(0.1), 1.5, thin=True), "leave out"),
@@ -205,6 +207,8 @@ def test_slopes_are_solved_by_chandezon_s_method_and_walls_by_coupled_waves():
     [
         ("0,1\n800,1\n800,0\n", "one period is 0 to 1.6 µm"),
         ("0,1\n0.3,1\n0.4,0\n", "covers 0.4 µm of a period"),
+        ("0,0\n0.2,0.1\n0.6,0.1\n0.8,0\n", "covers 0.8 µm of a period"),
+        ("".join(f"{0.01 * n},0\n" for n in range(150)), "covers 1.49 µm of a period"),
         ("x,z\n0,1\n0.3\n", "line 3"),
         ("0,1,2\n", "line 1"),
         ("0,nan\n1,0\n", "line 1"),
@@ -218,6 +222,13 @@ def test_lines_that_are_no_period_are_refused(points, message, tmp_path):
     with pytest.raises(DiffractionError, match=message) as caught:
         read_profile(file, 1.6)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("period", [1.58, 1.59, 1.595, 1.6])
+def test_a_sampled_line_may_end_a_point_before_its_period(tmp_path, period):
+    file = tmp_path / "groove.csv"
+    np.savetxt(file, np.column_stack([0.01 * np.arange(159), np.zeros(159)]), delimiter=",")
+    assert len(read_profile(file, period).x) >= 158
 
 
 def test_a_line_whose_ends_differ_gets_a_wall_and_a_warning(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +16,10 @@ from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.films import read_layers, structure_of
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import AUTO, Jobs, problem_of, solver_of
+from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.resolution import places_to_test, resolved
+from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating, reversed_light
 
 PERIOD = 0.5
@@ -238,3 +241,26 @@ def test_films_move_a_profile(solver, profile):
     # e⁻⁴⁵ of the light reaches the glass; a moved profile gives these phases
     assert np.abs(np.abs(amplitudes(thick)) - np.abs(expected)).max() < 1e-6
     assert np.abs(amplitudes(air) - expected).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("layers", "step", "warned"),
+    [
+        ([("1.38", 100.0)], 5.0, True),  # 100 nm, given as µm
+        ([("1.38", 0.1)], 5.0, False),
+        ([("1.38", 100.0)], 1.0, False),  # one wavelength: nothing is interpolated
+        ([("1.38", 100.0), ("Al", 1.0)], 5.0, False),  # behind a mirror
+        ([("1.38", 4.0)], 5.0, False),  # fringes 22 nm apart
+    ],
+)
+def test_fringes_that_the_wavelengths_do_not_resolve_are_warned_of(layers, step, warned):
+    limits = (500.0, 500.0) if step == 1.0 else (500.0, 505.0)
+    settings = Settings(limits, method="chandezon", resolution=5)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solve_orders(sinusoidal(0.4, 0.02), layers=layers, theta=0.0, step=step, settings=settings)
+    lines = [str(each.message) for each in caught if "fringes" in str(each.message)]
+    assert len(lines) == warned
+    for line in lines:  # the step that it names resolves them
+        named = float(line.partition("step=")[2].split()[0])
+        assert named == pytest.approx(0.5 * 500.0**2 / (2e3 * 1.38 * 100.0), rel=0.02)
