@@ -28,8 +28,6 @@ from tests.support.command_line import Ran
 from tests.support.kernels import Called, called_objects, compile_quickly, transform_once
 from tests.support.variants import SOME, VARIANTS, obstacle, use
 
-pytest_plugins = ["tests.support.processor_time"]
-
 transform_once()  # before Mitsuba is imported
 
 
