@@ -37,8 +37,8 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=60 -o out/snake_other_light.exr
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
-# one thread for linear algebra in each process; TIMES=1 prints what the processor time went into
-PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest --dist worksteal $(if $(TIMES),--processor-time)
+# one thread for linear algebra in each process; TIMES=1 prints the slowest tests
+PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest --dist worksteal $(if $(TIMES),--durations=40)
 test: setup .venv/browser  ## run the quick tests, of every part: three minutes
 	@$(PYTEST) -n 2 -m "not thorough"
 

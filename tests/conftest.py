@@ -21,14 +21,12 @@ from tests.support import ROOT
 os.environ["DRJIT_CACHE_DIR"] = str(ROOT / ".pytest_cache" / "kernels")
 
 import mitsuba_diffraction  # noqa: F401 - before Dr.Jit: it chooses the LLVM that Dr.Jit loads
-from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+from mitsuba_diffraction.tables.energy.settings import EnergySettings
 from mitsuba_diffraction.tables.store import VARIABLE
-from tests.support.coarse import coarse_energy
+from tests.support.coarse import COARSE, energy_as
 from tests.support.command_line import Ran
 from tests.support.kernels import Called, called_objects, compile_quickly, transform_once
 from tests.support.variants import SOME, VARIANTS, obstacle, use
-
-pytest_plugins = ["tests.support.processor_time"]
 
 transform_once()  # before Mitsuba is imported
 
@@ -153,17 +151,15 @@ def own_vectors() -> int:
 @pytest.fixture(scope="session", autouse=True)
 def coarse() -> Iterator[None]:
     """Energy conserved coarsely: scales as fine as users have them take seconds to find."""
-    before = coarse_energy()
-    yield
-    use_energy_settings(before)
+    with energy_as(COARSE):
+        yield
 
 
 @pytest.fixture(scope="module")
 def fine(coarse: None) -> Iterator[None]:
     """Energy conserved as finely as users have it, for modules that ask how well it is."""
-    before = use_energy_settings(EnergySettings())
-    yield
-    use_energy_settings(before)
+    with energy_as(EnergySettings()):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ import tomllib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
@@ -190,34 +189,6 @@ def test_xml_blocks_set_parameters_that_exist(page, text, some_variant):
         for bsdf in root.iterfind(f".//bsdf[@type='{plugin}']"):
             named = {child.get("name") for child in bsdf if child.tag != "bsdf"}
             assert named <= set(names)
-
-
-FACES = {
-    "rectangle": [([0.3, 0.2, 3], [1, 0, 0])],
-    "disk": [([0.3, 0.4, 3], [0.6, 0.8, 0])],
-    "sphere": [([3, 0, 0.5], [0, 1, 0])],
-    "cylinder": [([3, 0, 0.5], [0, 1, 0])],
-    "cube": [
-        ([0.1, 0.2, 3], [0, 1, 0]),
-        ([3, 0.1, 0.2], [0, 1, 0]),
-        ([-3, 0.1, 0.2], [0, 1, 0]),
-        ([0.1, 0.2, -3], [0, -1, 0]),
-        ([0.1, 3, 0.2], [-1, 0, 0]),
-        ([0.1, -3, 0.2], [0, 0, 1]),
-    ],
-}
-
-
-@pytest.mark.parametrize("shape", FACES)
-def test_tangents_of_shapes_are_those_of_the_table_in_own_scene(shape):
-    import mitsuba as mi
-
-    mi.set_variant("scalar_rgb")
-    scene = mi.load_dict({"type": "scene", "shape": {"type": shape}})
-    for outside, expected in FACES[shape]:
-        towards = -np.sign(outside) * (np.abs(outside) > 1)  # along the axis that is far away
-        along = np.array(scene.ray_intersect(mi.Ray3f(outside, list(towards))).dp_du)
-        np.testing.assert_allclose(along / np.linalg.norm(along), expected, atol=1e-5)
 
 
 TROUBLES = PAGES["docs/troubleshooting.md"]

@@ -128,12 +128,6 @@ def test_the_sun_stands_where_the_angles_say(azimuth: float, elevation: float) -
     assert np.degrees(np.arccos(mean @ expected / np.linalg.norm(mean))) < 0.06
 
 
-@pytest.mark.usefixtures("variant")
-def test_a_patch_of_the_user_replaces_the_default(gentle: dict[str, str]) -> None:
-    own = {name: gentle[name] for name in ("patch", "pixel_size")}
-    assert np.isfinite(rendered("plate", **own)).all()
-
-
 @pytest.mark.parametrize("name", ["plate", "sphere", "snake", "xenopeltis"])
 @pytest.mark.usefixtures("variant")
 @pytest.mark.thorough

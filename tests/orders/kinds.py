@@ -17,17 +17,14 @@ from tests.support import crossed
 from tests.support.directions import Array, as_single, turned
 from tests.support.orders import listed_grating, load, shallow_grating, thin_grating
 
+#: Index of the block.
+INDEX = 1.5
 
-def block_grating(
-    period: float = 0.45,
-    wavelengths: tuple[float, float] = (450.0, 650.0),
-    index: float = 1.5,
-    counts: Counts = Counts(5, 4, 3),  # noqa: B008 - immutable
-    strength: float = 0.006,
-    zeroth: float = 0.92,
-) -> OrderTable:
-    """A block's face: orders ±1 have G_j G_q times a strength, order 0 F times zeroth."""
-    optical = index * period
+
+def block_grating() -> OrderTable:
+    """A block's face: orders ±1 have G_j G_q times a strength, order 0 F times 0.92."""
+    period, wavelengths, counts = 0.45, (450.0, 650.0), Counts(5, 4, 3)
+    optical = INDEX * period
 
     def kind(k: int, kind: int) -> np.ndarray:
         channels = np.arange(k + 1 - kind)
@@ -35,10 +32,10 @@ def block_grating(
         tau, rho = tau[:, None, None], rho[:, None]
         lam = cells.wavelength_of(k + cells.sine_squared(rho), w, wavelengths, optical)
         light = cells.from_cell(k, kind, channels, tau, rho, lam, optical)
-        scale, _ = blocks.factors(index * light.x, index * light.y, index)
+        scale, _ = blocks.factors(INDEX * light.x, INDEX * light.y, INDEX)
         port = np.arange(2 * len(channels))
         order = np.abs(np.subtract.outer(port % len(channels), port % len(channels)))
-        values = np.select([order == 0, order == 1], [zeroth, strength], 0.0) * scale
+        values = np.select([order == 0, order == 1], [0.92, 0.006], 0.0) * scale
         values /= np.maximum(values.sum(axis=-1, keepdims=True), 1.0)
         values[..., port, port] = np.maximum(1.0 - values.sum(axis=-1), 0.0)
         return values[..., None].astype(np.float32)
@@ -48,12 +45,10 @@ def block_grating(
         for k in range(cells.largest_band(wavelengths, optical) + 1)
     )
     response, header = CellResponse(bands, even=True), {"profile": "weak"}
-    return OrderTable((period, np.inf), wavelengths, response, header=header, block=index)
+    return OrderTable((period, np.inf), wavelengths, response, header=header, block=INDEX)
 
 
 BLOCK = block_grating()
-#: Index of the block, and the distance of its orders at 550 nm.
-INDEX, STEP = 1.5, 550.0 / (1e3 * BLOCK.period)
 KINDS: dict[str, Callable[[], OrderTable]] = {
     "grooves": functools.cache(thin_grating),
     "sheet": functools.cache(lambda: thin_grating(thin=True)),

@@ -6,17 +6,15 @@ from collections.abc import Iterator
 
 import pytest
 
-from mitsuba_diffraction.tables.energy.settings import use_energy_settings
-from tests.support.coarse import coarse_energy
+from tests.support.coarse import COARSE, energy_as
 from tests.support.variants import use
 
 
 @pytest.fixture
 def coarsely() -> Iterator[None]:
     """Energy conserved coarsely, for a test of a module that asks for `fine`."""
-    before = coarse_energy()
-    yield
-    use_energy_settings(before)
+    with energy_as(COARSE):
+        yield
 
 
 @pytest.fixture

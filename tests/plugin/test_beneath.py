@@ -11,7 +11,8 @@ from mitsuba_diffraction.reference import fresnel
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Energy
 from mitsuba_diffraction.tables.energy.conserved import Reflector
-from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+from mitsuba_diffraction.tables.energy.settings import EnergySettings
+from tests.support.coarse import energy_as
 from tests.support.furnace import furnace
 from tests.support.gentle import load, pairs
 from tests.support.lanes import bitmap, evaluated, interaction, spectra, vectors, with_bitmaps
@@ -75,10 +76,9 @@ FRINGES = {
 @pytest.mark.parametrize("name", FRINGES)
 def test_a_film_of_many_fringes_over_white_sends_on_no_more_than_it_gets(some_variant, name):
     # its fringes come and go within 25 nm; a window of a wavelength smears them
-    before = use_energy_settings(EnergySettings(polar=24, azimuthal=12))
     film = with_bitmaps(FRINGES[name]) | {"film_ior": 1.32, "int_ior": 1.1, "ext_ior": 1.0}
-    bsdf = load(FLAT, **film, coherence_width=0.5, beneath=WHITE)
-    use_energy_settings(before)
+    with energy_as(EnergySettings(polar=24, azimuthal=12)):
+        bsdf = load(FLAT, **film, coherence_width=0.5, beneath=WHITE)
     # four times, at other wavelengths
     mean, error = furnace(bsdf, angles=4 * (70.0, 80.0, 84.0, 87.0), azimuths=(0.0,))
     assert np.all(mean <= 1.003 + 4.0 * error)

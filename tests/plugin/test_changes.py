@@ -19,34 +19,13 @@ from tests.support.kinds import KINDS, MIX, THROUGH, made
 from tests.support.lanes import brdf_values, evaluated, interaction, vectors
 
 
-def test_what_may_change_is_listed(some_variant):
-    names = {
-        "perfect": set(mi.traverse(load()).keys()),
-        "dielectric": set(mi.traverse(load(int_ior=1.5)).keys()),
-        "conductor": set(mi.traverse(load(material="Al")).keys()),
-        "coated": set(mi.traverse(load(int_ior=1.5, pigment={"type": "diffuse"})).keys()),
-    }
-    always = {"data", "height_scale", "orientation"}
-    assert names["perfect"] == always
-    assert names["dielectric"] == always | {"eta"}
-    assert always < names["conductor"]
-    assert {n.split(".")[0] for n in names["conductor"]} == always | {"eta", "k"}
-    assert always | {"eta"} < names["coated"]
-    assert any(n.startswith("nested.") for n in names["coated"])
-
-
-def test_a_changed_height_scale_is_that_of_a_new_plugin(variant):
+def test_a_changed_height_scale_is_a_factor_on_the_table_s_heights(variant):
     bsdf = load()
     parameters = mi.traverse(bsdf)
     parameters["height_scale"] = 1.4
     parameters.update()
     wi, wo, lam = pairs()
     changed = brdf_values(bsdf, wi, wo, lam[:, None])
-    assert changed == pytest.approx(
-        brdf_values(load(height_scale=1.4), wi, wo, lam[:, None]),
-        rel=1e-2,  # another table, since this one must serve 1.5 · 1.4; to 1e-3 of all
-        abs=1e-3 * changed.max(),
-    )
     expected = bsdf.table.brdf(wi, wo, lam, height_scale=1.4)
     assert np.sum(np.abs(changed - expected)) < 1e-5 * np.sum(expected)  # single precision
 
@@ -59,9 +38,6 @@ COATED = {"eta": 0.9, "k": 6.0, "coat_ior": 1.58}
     ("given", "name", "value", "said"),
     [
         ({}, "height_scale", 1.51, RANGE),
-        ({}, "height_scale", 0.0, RANGE),
-        ({}, "height_scale", -1.0, RANGE),
-        ({}, "height_scale", float("nan"), RANGE),
         (COATED, "height_scale", 1.6, RANGE),
         (COATED, "coat_eta", 0.9, "coat_eta=0.9"),
         (COATED, "coat_eta", 2.9, "beyond the table's 2.37"),
@@ -90,22 +66,6 @@ def test_a_new_value_needs_no_new_kernel(variant):
             history = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
             if scale > 0.7:
                 assert all(kernel["cache_hit"] for kernel in history)
-
-
-def test_it_says_what_it_is(some_variant):
-    text = str(load(int_ior=1.5, orientation=30.0, height_scale=1.2))
-    assert text.startswith("Diffraction[\n")
-    for part in (
-        "svd power, ensemble",
-        "coherence_width = 4.5 µm",
-        "tolerance = 0.001",
-        "dielectric[eta = 1.4996]",
-        "height_scale = 1.2",
-        "orientation = 30°",
-    ):
-        assert part in text
-    assert "SmoothDiffuse" in str(load(int_ior=1.5, pigment={"type": "diffuse"}))
-    assert "conductor[Al]" in str(load(material="Al"))
 
 
 class Surface:

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.optics.geometry import wavenumber
-from mitsuba_diffraction.plugin.directions import Site
 from tests.support.directions import polar, uniform_directions
 from tests.support.furnace import (
     COMBINATIONS,
@@ -18,13 +16,12 @@ from tests.support.furnace import (
     assert_at_most_white,
     bsdf,
     check_combination,
-    furnace,
     furnace_in,
     random_directions,
     steep_sinusoid,
     white_pair,
 )
-from tests.support.lanes import bitmap, evaluated, lanes
+from tests.support.lanes import bitmap, evaluated
 
 pytestmark = pytest.mark.usefixtures("fine")
 
@@ -134,13 +131,6 @@ def test_white_furnace_in_its_own_shade(mono, name, base):
 
 
 @thorough
-def test_the_raw_model_gains_energy(mono):
-    # the sinusoid at 75°, λ such that an order leaves at the horizon: well above white
-    surface = bsdf("sinusoid", energy_conserving=False)
-    assert furnace(surface, [75.0] * 8, [0.0])[0].max() > 1.2
-
-
-@thorough
 def test_white_furnace_of_the_measured_patch(mono, shared_afm):
     patch = md.HeightField.load(
         shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375
@@ -190,26 +180,6 @@ def test_the_bound_follows_height_scale(mono):
     parameters["height_scale"] = 1.3
     parameters.update()
     assert_at_most_white(surface)
-
-
-@thorough
-def test_kernels_twin_agrees_with_numpy():
-    surface = bsdf("sinusoid")
-    model = surface.energy
-    found = model._energies[0].at(1.0).scale
-    rng = np.random.default_rng(0)
-    z, azimuth = rng.uniform(0.02, 1.0, 500), rng.uniform(-np.pi, np.pi, 500)
-    sine = np.sqrt(1.0 - z**2)
-    direction = mi.Vector3f(*map(lanes, (sine * np.cos(azimuth), sine * np.sin(azimuth), z)))
-    frame = surface.frame_at(dr.zeros(mi.SurfaceInteraction3f), mi.Bool(True))
-    for wavelength in (360.0, 512.0, 830.0):
-        k = mi.Float(float(wavenumber(wavelength)))
-        site = Site(dr.zeros(mi.SurfaceInteraction3f), frame, mi.Float(1.0), [k])
-        ours = model._scale.at(direction, site)[0]
-        # single precision in acos, amplified where the scale is steep
-        assert np.array(ours) == pytest.approx(
-            found.at(np.arccos(z), azimuth, wavelength), rel=2e-3
-        )
 
 
 @thorough

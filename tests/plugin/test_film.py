@@ -22,7 +22,6 @@ from tests.support.variants import evaluate, use
 
 pytestmark = pytest.mark.thorough
 
-OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}
 METAL = {"eta": 0.9, "k": 6.0}
 GLASS = {"int_ior": 1.56, "ext_ior": 1.0}
 

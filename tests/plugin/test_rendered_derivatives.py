@@ -14,7 +14,16 @@ import mitsuba_diffraction as md
 from tests.support.directions import polar
 from tests.support.lanes import interaction, vectors
 from tests.support.orders import thin_grating
-from tests.support.rendered import check, plate
+from tests.support.rendered import SURFACES, check, plate
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_table_of_surfaces_has_every_differentiable_parameter(mono, name):
+    parameters = mi.traverse(mi.load_dict(plate(name, 6.0)))
+    fixed = int(mi.ParamFlags.NonDifferentiable)
+    names = [key for key, _ in parameters]  # iterating gives pairs
+    differentiable = {key for key in names if not int(parameters.flags(key)) & fixed}
+    assert differentiable == set(SURFACES[name][1])
 
 
 @pytest.mark.parametrize(

@@ -32,16 +32,6 @@ def case_of(n: int, name: str) -> tuple[str, str, float]:
 CASES = [case_of(n, name) for n, name in enumerate(SURFACES)]
 
 
-@pytest.mark.parametrize("name", SURFACES)
-def test_the_list_has_every_differentiable_parameter(name):
-    mi.set_variant("llvm_ad_mono")
-    parameters = mi.traverse(mi.load_dict(plate(name, 6.0)))
-    fixed = int(mi.ParamFlags.NonDifferentiable)
-    names = [key for key, _ in parameters]  # iterating gives pairs
-    differentiable = {key for key in names if not int(parameters.flags(key)) & fixed}
-    assert differentiable == set(SURFACES[name][1])
-
-
 @pytest.mark.parametrize(("mitsuba_variant", "name", "width"), CASES)
 def test_every_parameter_has_the_derivative_of_differences(mitsuba_variant, name, width):
     use(mitsuba_variant)

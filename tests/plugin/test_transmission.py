@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+from mitsuba_diffraction.tables.energy.settings import EnergySettings
+from tests.support.coarse import energy_as
 from tests.support.directions import polar, rough_patch
 from tests.support.furnace import furnace_in, sent_on
 from tests.support.lanes import interaction, spectra, vectors
@@ -98,13 +99,12 @@ def test_conserved_both_sides_add_up_to_all_light(kind, theta, lengths, width):
     size = {"periods": math.ceil(width / period), "pixels_per_period": math.ceil(period / 0.0895)}
     grating = md.gratings.sinusoidal(period, depth, **size)
     common = {"field": grating, "coherence_width": width, **SIDES[kind]}
-    before = use_energy_settings(EnergySettings(side_wavelengths=3, azimuthal=36))  # one at 550
     light = {"wavelength": 550.0, "mode": "Importance", "samples": 1 << 15}
-    (raw, error), (conserved, _) = (
-        furnace_in(both(energy_conserving=e, **common), polar(theta, 20.0)[None], 0, **light)
-        for e in (False, True)
-    )
-    use_energy_settings(before)
+    with energy_as(EnergySettings(side_wavelengths=3, azimuthal=36)):  # one at 550
+        (raw, error), (conserved, _) = (
+            furnace_in(both(energy_conserving=e, **common), polar(theta, 20.0)[None], 0, **light)
+            for e in (False, True)
+        )
     # first order gains light, and a sheet loses the light beyond its critical angle
     assert np.all(raw > 1.0 + 3 * error if kind == "dielectric" else raw < 0.99 - 3 * error)
     assert np.all((0.98 - 3 * error < conserved) & (conserved < 1.001 + 3 * error))

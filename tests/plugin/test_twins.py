@@ -130,14 +130,21 @@ def test_densities_over_a_stretched_patch_are_those_over_the_table_times_the_are
 def test_a_stretched_patch_has_the_scales_of_light_and_heights_divided_by_the_stretch():
     factors = ScaleRange((0.5, 1.0), (0.5, 1.0), True, False)
     lam, nodes = np.geomspace(*factors.wavelengths((400.0, 700.0)), 9), [0.5, 1.0, 1.5, 2.0]
-    page = np.log2(lam)[:, None, None] * np.ones((3, 4))
-    pages = [[DirectionalTable(lam, (page * node).astype(np.float32))] for node in nodes]
+    directions = np.random.default_rng(3).normal(size=(9, 3)) * [1.0, 1.0, 0.4]
+    directions[:, 2] = np.abs(directions[:, 2])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    page = np.log2(lam)[:, None, None] * (1.0 + np.random.default_rng(4).random((9, 12)))
+    scale = DirectionalTable(lam, page.astype(np.float32))
+    pages = [[DirectionalTable(lam, node * scale.values)] for node in nodes]
     lookup, light = DirectionLookup(pages, nodes, factors), np.array([450.0, 600.0])
     for stretch, height in ((0.6, 0.8), (1.0, 0.7)):
         frame = PatchFrame((1.0, 0.0), stretch)
         site = Site(mi.SurfaceInteraction3f(), frame, height, wavenumber(light).tolist())
-        expected = height / stretch * np.log2(light / stretch)  # linear in both
-        assert_allclose(lookup.at(mi.Vector3f(0.6, 0.0, 0.8), site), expected, rtol=1e-5)
+        for x, y, z in directions.tolist():
+            # linear in the height; single precision of arccos
+            angles = np.arccos(z), np.arctan2(y, x)
+            expected = [height / stretch * scale.at(*angles, one) for one in light / stretch]
+            assert_allclose(lookup.at(mi.Vector3f(x, y, z), site), expected, rtol=1e-5)
 
 
 def test_the_energy_of_a_stretched_patch_has_the_index_of_the_light():

@@ -28,9 +28,9 @@ COARSE = EnergySettings(
 )
 
 
-def coarse_energy() -> EnergySettings:
-    """Conserve energy coarsely in this process from now on; return the settings before."""
-    return use_energy_settings(COARSE)
+def coarse_energy() -> None:
+    """Conserve energy coarsely in this process from now on."""
+    use_energy_settings(COARSE)
 
 
 @contextlib.contextmanager

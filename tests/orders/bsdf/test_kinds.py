@@ -9,11 +9,8 @@ import pytest
 
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from tests.orders.kinds import (
-    BLOCK,
-    INDEX,
     KINDS,
     NM,
-    STEP,
     TURN,
     albedo_of,
     indices,
@@ -151,38 +148,11 @@ def test_a_component_is_the_light_of_its_side(some_variant, kind, component):
     assert np.array_equal(part[0], np.where((passed == component)[:, None], whole, 0.0))
     sides = part[4][:, 2] * wi[:, 2] < 0.0
     assert np.all(part[5][sides != component] == 0.0)
-
-
-@pytest.mark.parametrize(
-    ("tangential", "within"),
-    [(0.4, False), (0.97, False), (0.4, True), (0.97, True), (1.2, True), (1.45, True)],
-)
-def test_samples_are_orders_in_their_directions_and_keep_all_light(
-    some_variant, tangential, within
-):
-    n, rng = 4000, np.random.default_rng(1)
-    came = INDEX if within else 1.0
-    x = tangential / came
-    wi = np.tile([x, 0.0, np.sqrt(1.0 - x * x) * (-1.0 if within else 1.0)], (n, 1))
-    light = np.full((n, 4), 550.0)
-    bsdf = loaded("block", coherence_width=500.0, orientation=0.0)
-    for mode in (mi.TransportMode.Radiance, mi.TransportMode.Importance):
-        numbers = mi.Float(rng.random(n)), mi.Point2f(rng.random((2, n)))
-        sample, weight = bsdf.sample(mi.BSDFContext(mode), interaction(wi, light), *numbers)
-        wo, weight, eta = np.array(sample.wo).T, np.array(weight)[0], np.array(sample.eta)
-        lit = weight > 0.0
-        # all but samples of lobes that reach beyond grazing
-        assert lit.mean() > 0.98
-        wo, weight, eta = wo[lit], weight[lit], eta[lit]
-        left = indices(BLOCK, wo)[:, 0]
-        order = (left * wo[:, 0] + came * x) / STEP
-        # lobes of 500 µm are 1e-3 wide
-        assert np.abs(order - np.round(order)).max() < 5e-3
-        assert eta == pytest.approx(left / came, rel=1e-6)
-        scale = (came / left) ** 2 if mode == mi.TransportMode.Radiance else np.ones(len(left))
-        # half floats
-        assert weight == pytest.approx(scale, rel=5e-3)
-        assert (wo[:, 2] > 0.0).any() == (tangential < 1.0 or tangential - STEP > -1.0)
+    numbers = mi.Float(samples[:, 0]), mi.Point2f(samples[:, 1:].T)
+    drawn, _ = bsdf.sample(mi.BSDFContext(), interaction(wi, lam), *numbers)
+    lit, left = np.array(drawn.pdf) > 0.0, np.array(drawn.wo).T
+    entered = (indices(KINDS[kind](), left) / indices(KINDS[kind](), wi))[lit, 0]
+    assert np.array(drawn.eta)[lit] == pytest.approx(entered, rel=1e-6)
 
 
 @pytest.mark.parametrize(
