@@ -48,7 +48,7 @@ def save_rgl(
     spectra = np.empty((len(phi) * len(theta), len(grid.wavelengths), n, n), np.float32)
     powers = np.empty((len(phi) * len(theta), n, n))
     for place, of_light in enumerate(laid(bsdf, nodes, grid, light_vectors(grid), progress)):
-        values, light = (np.concatenate([part, part[:1]]) for part in of_light)
+        values, light = (np.concatenate([part, part[:1]]) for part in of_light[:2])
         spectra[place], powers[place] = np.moveaxis(values, -1, 0), light.mean(axis=-1)
     spectra = spectra.reshape(len(phi), len(theta), *spectra.shape[1:])
     # density in u and v by which light is drawn: the light at each node, and an even share; nodes
