@@ -155,7 +155,7 @@ def gain_of(args: argparse.Namespace) -> Any:
     options.Group("the map", (
         *options.direction(),
         *options.SPECTRUM,
-        ("--wavelength NM", "one wavelength only, in false colours", float),
+        ("--wavelength NM", "one wavelength only, in false colours", number_between(10, 100_000)),
         ("--resolution N", "pixels a side", int, 512),
         ("--samples N", "directions in a pixel; default: enough to find every lobe", int),
         ("--illuminant", "light for the colours, daylight or equal energy", ILLUMINANTS, "D65"),

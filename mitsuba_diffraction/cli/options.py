@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,17 +113,22 @@ def number_between(low: float, high: float) -> Callable[[str], float]:
 
 
 def _number(
-    kind: Callable[[str], Any], low: float, high: float, expected: str
+    kind: Callable[[str], Any], low: float | None, high: float, expected: str
 ) -> Callable[[str], Any]:
+    """Return a type of argument: a number from `low` to `high`; any, and NaN, if `low` is None."""
+
     def number(text: str) -> Any:
         with contextlib.suppress(ValueError):
-            if low <= (value := kind(text)) <= high:
+            value = kind(text)
+            if low is None or low <= value <= high:
                 return value
         raise argparse.ArgumentTypeError(f"expected {expected}, got {quoted(text)}")
 
     return number
 
 
+# Kinds of numbers whose limits the commands check, in words.
+_NUMBERS: dict[Any, str] = {float: "one number", int: "one whole number"}
 #: Type of an exposure.
 STOPS = number_between(-100, 100)
 
@@ -226,6 +232,8 @@ def add_option(
         how["action"] = "store_true"
     elif isinstance(kind, list):
         how |= {"action": "append", "type": kind[0], "default": []}
+    elif kind in _NUMBERS:
+        how["type"] = _number(kind, None, math.inf, _NUMBERS[kind])
     elif kind is not None:  # BooleanOptionalAction takes no type, not even None
         how["choices" if isinstance(kind, tuple) else "type"] = kind
     if default is not None:

@@ -259,7 +259,11 @@ USAGE = {
         "--method spectral --terms 5": "argument --terms: has no effect with --method spectral",
         "--method pq --coherence patch": "argument --coherence: has no effect with --method pq",
     },
-    "brdf-map": {"--preset snake,orientation=3": "name the preset alone"},
+    "brdf-map": {
+        "--preset snake,orientation=3": "name the preset alone",
+        "--preset snake --wavelength 550,600": "from 10 to 100000, got '550,600'",
+        "--preset snake --theta 1,2": "expected one number, got '1,2'",
+    },
     "evaluate grating.npy --pixel-size 0.08": {
         "--method rainbow --tolerance 0.1": "argument --tolerance: has no effect",
         "--coherence patch --terms 5": "argument --terms: has no effect",

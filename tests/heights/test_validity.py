@@ -62,6 +62,15 @@ def test_whole_periods_of_a_grating_are_let_be(kind, periods, levels):
     assert not tilted(cut_out(heights.T, 2.5 / 40), SHORTEST)
 
 
+@pytest.mark.parametrize("periods", [3, 4, 5])
+def test_few_periods_of_a_sine_keep_their_height_when_loaded(tmp_path, periods):
+    """The least-squares plane of a sine that begins at 0 rises by up to 0.6 of its amplitude."""
+    x = 0.05 * np.arange(16 * periods)
+    np.save(tmp_path / "sine.npy", np.tile(0.15 * np.sin(2.0 * np.pi * x / 0.8), (40, 1)))
+    loaded = HeightField.load(tmp_path / "sine.npy", pixel_size=0.05)
+    assert loaded.rms_height == pytest.approx(0.15 / np.sqrt(2.0), rel=1e-9)  # rounding
+
+
 MADE = {
     "rough": lambda: rough_patch((64, 64), (0.05, 0.05), 0.1),
     "noise": lambda: HeightField(np.random.default_rng(1).normal(size=(64, 48)), 0.05),
