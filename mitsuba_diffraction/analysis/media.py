@@ -20,6 +20,8 @@ from ..tables import TableSource
 
 #: Largest index of a medium above a surface.
 MOST_MEDIUM = 2.0
+#: Factors that waves in a medium are followed by.
+_LENGTHS = ("height_scale", "lateral_scale")
 
 
 def medium_index(ext_ior: str | float | None, wavelength: float = SODIUM) -> float:
@@ -96,7 +98,7 @@ def follow(
         changes["coat_eta"] = lambda lam: _dispersion(coat, lam) / _dispersion(medium, lam)
     if _disperses(medium):
         most = _dispersion(medium, shortest)
-        for name in ("height_scale", "lateral_scale"):
+        for name in _LENGTHS:
             changes[name] = lambda lam: _dispersion(medium, lam) / most
     if not changes:
         return None
@@ -109,7 +111,11 @@ def follow(
     def set_paths(wavelength: float) -> None:
         for name, factor in changes.items():
             shown[name] = mi.Float(loaded[name] * factor(wavelength))
+            # scales of energy of optimised lengths serve an interval, and so most wavelengths
+            dr.set_grad_enabled(shown[name], name in _LENGTHS)
         shown.update()
+        for name in changes:
+            dr.disable_grad(shown[name])
 
     return set_paths
 

@@ -18,6 +18,7 @@ from mitsuba_diffraction.analysis.spectra import spectrum, table_range
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.optics.materials import TISSUES
 from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.tables.energy import conservation
 
 pytestmark = pytest.mark.usefixtures("spectral")
 
@@ -92,6 +93,22 @@ def test_orders_through_water_and_of_absorbing_tissue_are_the_reference_s(parame
         light = [collected(LIGHT, a, lam, parameters["material"], coat, above) for a in angles]
         # the table's tolerance of 0.1 % and the lobe's bend
         assert measured(lam, angles) == pytest.approx(np.array(light) / standard, rel=0.01)
+
+
+def test_scales_of_energy_are_found_once_for_all_wavelengths_in_water(monkeypatch):
+    parameters, found = {"material": "Al", "ext_ior": "water"}, []
+    conserve = conservation.SurfaceEnergy.conservation
+    monkeypatch.setattr(
+        conservation.SurfaceEnergy,
+        "conservation",
+        lambda self, *light: found.append(light) or conserve(self, *light),
+    )
+    measured = measuring(parameters)
+    loaded = len(found)
+    for lam in np.linspace(LAM[0], LAM[-1], 8):
+        measured(lam, [LIGHT])
+    # at two height scales for the shortest wavelength, and for the 2 % below its index
+    assert len(found) - loaded <= 4
 
 
 @pytest.mark.parametrize("lam", LAM)
