@@ -79,8 +79,11 @@ gallery: setup  ## make the pictures of docs/gallery.md and docs/meshes.md
 evaluation: setup  ## make docs/thesis.md: ridges, grating equation, fitted periods
 	@$(PYTHON3) -m docs.make.figures.thesis evaluation $(if $(MEASURED),--measured $(MEASURED))
 
-sweeps: setup  ## make docs/thesis.md: contact sheets of BRDF maps
-	@$(PYTHON3) -m docs.make.figures.thesis sweeps $(if $(MEASURED),--measured $(MEASURED))
+sweeps: setup  ## make docs/thesis.md: contact sheet of BRDF maps
+	@mkdir -p out
+	@$(RUN) sweep wavelength-step $(or $(MEASURED),precompute/elaphe_like.toml) --theta 30 --wavelength-range 380:780 \
+	    --resolution 160 -o docs/images/sweep-wavelength-step.png --json out/sweep.json
+	@$(PYTHON3) -m docs.make.figures.tables sweep out/sweep.json
 
 methods: setup  ## measure the methods: docs/thesis.md
 	@$(PYTHON3) -m docs.make.figures.thesis methods $(if $(MEASURED),--measured $(MEASURED))

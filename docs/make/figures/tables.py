@@ -1,10 +1,10 @@
-"""Tables of docs/performance.md, accuracy.md and energy.md, from measurements by commands.
+"""Tables of docs/performance.md, accuracy.md, energy.md and thesis.md, measured by commands.
 
 python -m docs.make.bench --json out/bench.json
 python -m docs.make.figures.tables speed out/bench.json
 
-Likewise `tradeoff` of the folder that `tradeoff -o` writes, `plan` of `plan --json`, and `energy`
-of what `info --energy --json` found of each surface.
+Likewise `tradeoff` of the folder that `tradeoff -o` writes, `plan` of `plan --json`, `sweep` of
+`sweep --json`, and `energy` of what `info --energy --json` found of each surface.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.thesis.sweeps import label_of
 
 from . import long_tables, pages
 from .pages import from_json, option, program
@@ -252,6 +253,16 @@ def _range(ends: Sequence[float]) -> str:
     return f"{ends[0]:.3f}–{ends[1]:.3f}"
 
 
+def swept(report: dict[str, Any], name: str = "") -> dict[str, str]:
+    """ΔE of every value of a sweep from the reference, which is the map without any."""
+    kind, rows = report["sweep"], []
+    for step in report["steps"]:
+        apart = step["delta_e_mean"]
+        shown = "" if apart is None else f"{apart:.2g}" if apart else "reference"
+        rows.append((label_of(kind, step["value"]), shown))
+    return {kind: pages.table(("value", "mean ΔE"), rows)}
+
+
 @dataclass(frozen=True)
 class Part:
     """Reader and writer of the measurements of a command."""
@@ -271,6 +282,7 @@ PARTS = {
     "tradeoff": Part(tradeoff, "docs/accuracy.md", "tradeoff", "run make tradeoff",
                      ("tradeoff.png", "depth.png")),
     "plan": Part(plan, "docs/performance.md", "plan --json", "run make plan"),
+    "sweep": Part(swept, "docs/thesis.md", "sweep --json", "run make sweeps"),
     "energy": Part(energy, "docs/energy.md", "info --energy --json", "run make energy"),
 }  # fmt: skip
 
