@@ -149,7 +149,7 @@ realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	        -D resx=$$2 -D resy=$$3 -o $$made; fi || exit 1; done
 	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method fast -s 512 --full-spp 128 \
 	    --frames 256 --supersampling 2 -D resx=320 -D resy=200 -o out/compare/sheet
-	@$(PYTHON3) -m docs.make.figures.realtime --sheet out/compare/sheet $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
+	@$(PYTHON3) -m docs.make.figures.tables realtime --pictures out/compare/sheet $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
 
 lint: setup  ## check style, types and the layers of imports
 	@$(PYTHON3) -m ruff check
