@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from mitsuba_diffraction.orders import solve
 from .cases import Case, Light, Media, Sampled
 from .compare import Comparison, compare
 from .light import heights_of, light_on, powers_of, solved_by
-from .solutions import Solutions, Solved
+from .solutions import Solved
 
 FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 #: Tables, and (θ, φ) of the light in degrees: across the grooves, oblique and along them.
@@ -80,17 +80,18 @@ class Shipped:
 
         theta, phi : of the light in air, degrees; a superstrate refracts it.
         """
-        superstrate, solved, by_table = self.recipe.superstrate, [], []
+        superstrate, solved = self.recipe.superstrate, []
         inside = float(np.degrees(np.arcsin(np.sin(np.radians(theta)) / superstrate)))
         for wavelength in wavelengths:
             light = Light(wavelength / superstrate, inside, phi)
             case = Case(self.surface, light, Media(self._index(wavelength)))
             found = solved_by(self.solver, case)
-            solved.append(Solved.between(case, found, found))
             x, y, _ = case.wi
             values = self.table.efficiency(-x, y, wavelength, found.order[:, 0])
-            by_table.append(np.repeat(values[:, None], 2, axis=1))
-        return compare(Solutions(solved), "small_slope"), Comparison(solved, by_table)
+            by_table = np.repeat(values[:, None], 2, axis=1)
+            solved.append(replace(Solved.between(case, found, found), other=by_table))
+        table = Comparison(solved)
+        return compare(table, "small_slope"), table
 
     def diffuse(self, samples: int = SAMPLES) -> Iterator[tuple[str, list[float]]]:
         """Yield each kind of light, and the deviations from the table's own solver in it.
