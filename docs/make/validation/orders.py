@@ -20,7 +20,7 @@ from mitsuba_diffraction.orders import solve
 
 from .cases import Case, Light, Media, Sampled
 from .compare import Comparison, compare
-from .light import heights_of, light_on, powers_of, solved_by
+from .light import heights_of, index_at, light_on, powers_of, solved_by
 from .solutions import Solved
 
 FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
@@ -84,7 +84,8 @@ class Shipped:
         inside = float(np.degrees(np.arcsin(np.sin(np.radians(theta)) / superstrate)))
         for wavelength in wavelengths:
             light = Light(wavelength / superstrate, inside, phi)
-            case = Case(self.surface, light, Media(self._index(wavelength)))
+            index = index_at(self.recipe.material, wavelength) / superstrate
+            case = Case(self.surface, light, Media(index))
             found = solved_by(self.solver, case)
             x, y, _ = case.wi
             values = self.table.efficiency(-x, y, wavelength, found.order[:, 0])
@@ -139,13 +140,6 @@ class Shipped:
         grating = solve.Grating(recipe.profile, material, recipe.superstrate, alone)
         powers = powers_of(solver, light_on(grating, x, y, lam))
         return {m: float(power.mean()) for m, power in powers.items()}
-
-    def _index(self, wavelength: float) -> complex:
-        """Return the index over that of the superstrate."""
-        recipe = self.recipe
-        index = solve.material_of(recipe.material, recipe.settings.wavelengths).index(wavelength)
-        assert index is not None
-        return complex(index) / recipe.superstrate
 
     @cached_property
     def solver(self) -> solve.Solver:
