@@ -99,11 +99,6 @@ class Solved:
         """Directions of the orders, (n, 3)."""
         return self.case.wo(self.order)
 
-    @property
-    def efficiency(self) -> Real:
-        """Efficiencies for unpolarised light, (n,)."""
-        return self.powers.mean(axis=1)
-
 
 @dataclass(frozen=True)
 class Solutions:
