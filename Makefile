@@ -79,8 +79,11 @@ gallery: setup  ## make the pictures of docs/gallery.md and docs/meshes.md
 evaluation: setup  ## make docs/thesis.md: ridges, grating equation, fitted periods
 	@$(PYTHON3) -m docs.make.figures.thesis evaluation $(if $(MEASURED),--measured $(MEASURED))
 
-sweeps: setup  ## make docs/thesis.md: contact sheets of BRDF maps
-	@$(PYTHON3) -m docs.make.figures.thesis sweeps $(if $(MEASURED),--measured $(MEASURED))
+sweeps: setup  ## make docs/thesis.md: contact sheet of BRDF maps
+	@mkdir -p out
+	@$(RUN) sweep wavelength-step $(or $(MEASURED),precompute/elaphe_like.toml) --theta 30 --wavelength-range 380:780 \
+	    --resolution 160 -o docs/images/sweep-wavelength-step.png --json out/sweep.json
+	@$(PYTHON3) -m docs.make.figures.tables sweep out/sweep.json
 
 methods: setup  ## measure the methods: docs/thesis.md
 	@$(PYTHON3) -m docs.make.figures.thesis methods $(if $(MEASURED),--measured $(MEASURED))
@@ -146,7 +149,7 @@ realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	        -D resx=$$2 -D resy=$$3 -o $$made; fi || exit 1; done
 	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method fast -s 512 --full-spp 128 \
 	    --frames 256 --supersampling 2 -D resx=320 -D resy=200 -o out/compare/sheet
-	@$(PYTHON3) -m docs.make.figures.realtime --sheet out/compare/sheet $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
+	@$(PYTHON3) -m docs.make.figures.tables realtime --pictures out/compare/sheet $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
 
 lint: setup  ## check style, types and the layers of imports
 	@$(PYTHON3) -m ruff check

@@ -34,6 +34,11 @@ def blocks(page: str, language: str) -> list[str]:
     return [text for name, text in FENCE.findall(PAGES[page]) if name == language]
 
 
+def markers(text: str) -> list[str]:
+    """Names of the generated parts of a page."""
+    return re.findall(r"<!-- begin (\S+) -->", text)
+
+
 def files_of(page: str) -> dict[str, str]:
     """The TOML files of a page by name: their blocks begin with `# NAME`."""
     named = (re.match(r"# (\S+\.toml)\n", text) for text in blocks(page, "toml"))

@@ -8,8 +8,7 @@ geometry                drawing of angles, axes, grooves and window in docs/conc
 interfaces              tables of commands, names, parameters and formats, from the code
 long_tables             long tables of pages as CSV files beside them
 presets                 balls of all presets
-tables                  tables of what `bench`, `tradeoff`, `plan` and `info --energy` measured
-realtime                tables of what `compare` measured
+tables                  tables of what `bench` and commands measured
 thesis, evaluation      docs/thesis.md: a table of methods, sweeps; the grating equation
 cluster, wide           a film on workers; a scan of 16,384² points, whole and by windows
 sheets                  transmitted orders of thin sheets, model and solution

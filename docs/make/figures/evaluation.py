@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,8 +35,6 @@ METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc")
 
 _DPI = 85
 _STEP = 5.0  # nm
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ import contextlib
 import io
 import json
 import os
-import re
+import subprocess
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, TypeVar
@@ -76,11 +77,6 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
     write_text(file, text)
 
 
-def markers(path: str | os.PathLike[str]) -> list[str]:
-    """Return the names of the parts that a file has markers for."""
-    return re.findall(r"<!-- begin (\S+) -->", _read(Path(path)))
-
-
 def _read(file: Path) -> str:
     try:
         return file.read_text(encoding="utf-8")
@@ -131,6 +127,24 @@ def run(*words: object) -> None:
         code = command(typed)
     if code != 0:
         raise DiffractionError(f"'{' '.join(typed)}' failed; see above")
+
+
+def timed(words: Sequence[object], **environment: str) -> tuple[Seconds, int]:
+    """Run a command of the package in a process of its own, whose output is not shown.
+
+    Returns
+    -------
+    Its time with that of its own processes, and its largest resident memory in bytes.
+    """
+    command = [sys.executable, "-m", "mitsuba_diffraction", *map(str, words)]
+    start = time.perf_counter()
+    process = subprocess.Popen(command, env=os.environ | environment, stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise DiffractionError(f"'{' '.join(command[2:])}' failed; see above")
+    seconds = Seconds(time.perf_counter() - start, used.ru_utime + used.ru_stime)
+    return seconds, 1024 * used.ru_maxrss
 
 
 def write_jpeg(

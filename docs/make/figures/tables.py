@@ -1,27 +1,34 @@
-"""Tables of docs/performance.md, accuracy.md and energy.md, from measurements by commands.
+"""Tables of pages from measurements by commands: performance, accuracy, energy, realtime, thesis.
 
 python -m docs.make.bench --json out/bench.json
 python -m docs.make.figures.tables speed out/bench.json
 
-Likewise `tradeoff` of the folder that `tradeoff -o` writes, `plan` of `plan --json`, and `energy`
-of what `info --energy --json` found of each surface.
+Likewise `tradeoff` of the folder that `tradeoff -o` writes, `plan` of `plan --json`, `sweep` of
+`sweep --json`, `energy` of what `info --energy --json` found of each surface, and `realtime` of the
+folders that `compare -o` wrote for scenes.
 """
 
 from __future__ import annotations
 
 import argparse
 import shutil
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.realtime.shader_comparison import plain_number
+from mitsuba_diffraction.thesis.sweeps import label_of
 
 from . import long_tables, pages
-from .pages import from_json, option, program
+from .pages import from_json, option, program, write_jpeg
+
+#: Names of files, and what commands wrote into these.
+Documents: TypeAlias = Sequence[tuple[str, dict[str, Any]]]
+# pixels of a picture as JPEG
+_WIDTH = 1600
 
 
 @dataclass(frozen=True)
@@ -78,7 +85,14 @@ FIGURES = (
 )  # fmt: skip
 
 
-def speed(measured: dict[str, Any], name: str = "") -> dict[str, str]:
+def _of_one(
+    tables: Callable[[dict[str, Any]], dict[str, str]],
+) -> Callable[[Documents], dict[str, str]]:
+    """Return the tables of a single document."""
+    return lambda documents: tables(documents[0][1])
+
+
+def speed(measured: dict[str, Any]) -> dict[str, str]:
     """Tables of speed and memory with the machine and the goals."""
     machine = measured["machine"]
     head = f"Measured by `make bench` on {machine['cores']} cores ({machine['processor']})"
@@ -118,7 +132,7 @@ _FRAMES = tuple(
 _RATIOS = ("eval", "sample", "snake", _SOLVED)
 
 
-def graphics_card(measured: dict[str, Any], name: str = "") -> dict[str, str]:
+def graphics_card(measured: dict[str, Any]) -> dict[str, str]:
     """Ratios by processor and graphics card, and frames of the shaders."""
     machine, sections = measured["machine"], measured["sections"]
     drivers = [s["title"].split(",")[0] for s in sections if s["title"].startswith("frames:")]
@@ -150,7 +164,7 @@ _SETTINGS = (
 )  # fmt: skip
 
 
-def tradeoff(measured: dict[str, Any], name: str = "") -> dict[str, str]:
+def tradeoff(measured: dict[str, Any]) -> dict[str, str]:
     """Errors, times and sizes by setting; sums over the spectrum."""
     settings = measured["settings"]
     machine = measured["machine"]
@@ -190,7 +204,7 @@ def _spectral(spectral: dict[str, Any]) -> str:
     return f"{by_step}\n\n{by_count}"
 
 
-def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
+def plan(report: dict[str, Any]) -> dict[str, str]:
     """Needs and memory of a plan beside the whole table."""
     table = report["tables"][0]
     whole, planned = table["whole"], table["planned"]
@@ -225,9 +239,13 @@ _ENERGY = (
 )  # fmt: skip
 
 
-def energy(report: dict[str, Any], name: str) -> dict[str, str]:
-    """A row for each material, from the file of `info --energy --json` for a table."""
-    rows = [_row(name, material, figures) for material, figures in report["energy"].items()]
+def energy(documents: Documents) -> dict[str, str]:
+    """A row for each table and material."""
+    rows = [
+        _row(name, material, figures)
+        for name, report in documents
+        for material, figures in report["energy"].items()
+    ]
     return {"energy": pages.table(_ENERGY, rows)}
 
 
@@ -252,26 +270,73 @@ def _range(ends: Sequence[float]) -> str:
     return f"{ends[0]:.3f}–{ends[1]:.3f}"
 
 
+def swept(report: dict[str, Any]) -> dict[str, str]:
+    """ΔE of every value of a sweep from the reference, which is the map without any."""
+    kind, rows = report["sweep"], []
+    for step in report["steps"]:
+        apart = step["delta_e_mean"]
+        shown = "" if apart is None else f"{apart:.2g}" if apart else "reference"
+        rows.append((label_of(kind, step["value"]), shown))
+    return {kind: pages.table(("value", "mean ΔE"), rows)}
+
+
+_OURS = ("fast", "exact")
+
+
+def realtime(documents: Documents) -> dict[str, str]:
+    """Deviations of the shaders over all pixels of scenes, and the noise in them.
+
+    Times and textures are those of the first scene.
+    """
+    header = ("scene", *(f"`{m}`" for m in _OURS), "noise of `exact`", "of the path tracer")
+    rows, high = [], 0.0
+    for _, document in documents:
+        entries = [document["methods"][method] for method in _OURS]
+        values = [
+            *(entry["direct"]["delta_e_mean"] for entry in entries),
+            entries[-1]["noise"]["delta_e_mean"],
+            document["noise"]["delta_e_mean"],
+        ]
+        high = max(high, *(e["direct"]["delta_e_percentiles"]["99"] for e in entries))
+        link = f"[{Path(document['scene']).stem}]({document['scene']})"
+        # links of `compare` start at the repository's root, those of the page in docs
+        rows.append((link.replace("](scenes/", "](../scenes/"), *map(plain_number, values)))
+    fast, exact = (documents[0][1]["methods"][method] for method in _OURS)
+    sizes = [plain_number(entry["texture_bytes"] / 1e6) for entry in (fast, exact)]
+    return {
+        "realtime": pages.table(header, rows),
+        "most": plain_number(high),
+        "times": plain_number(exact["frame_ms"] / fast["frame_ms"]),
+        "textures": f"{sizes[0]} MB (`fast`) and {sizes[1]} MB (`exact`)",
+    }
+
+
 @dataclass(frozen=True)
 class Part:
     """Reader and writer of the measurements of a command."""
 
-    # Markdown by the name of its markers, from a document and the name of its file
-    tables: Callable[[dict[str, Any], str], dict[str, str]]
+    tables: Callable[[Documents], dict[str, str]]  # Markdown by the name of its markers
     page: str  # that has the markers
     writer: str  # the command that writes such documents
     remedy: str  # what to do about another file
-    pictures: tuple[str, ...] = ()  # that lie beside a document named as the part is, in a folder
+    # a document in a folder, and pictures there, by the names that they have in docs/images
+    document: str = ""
+    pictures: Mapping[str, str] = field(default_factory=dict)
 
 
 PARTS = {
-    "speed": Part(speed, "docs/performance.md", "docs.make.bench --json", "run make bench"),
-    "card": Part(graphics_card, "docs/performance.md", "docs.make.bench --json",
+    "speed": Part(_of_one(speed), "docs/performance.md", "docs.make.bench --json",
+                  "run make bench"),
+    "card": Part(_of_one(graphics_card), "docs/performance.md", "docs.make.bench --json",
                  "run make bench-gpu"),
-    "tradeoff": Part(tradeoff, "docs/accuracy.md", "tradeoff", "run make tradeoff",
-                     ("tradeoff.png", "depth.png")),
-    "plan": Part(plan, "docs/performance.md", "plan --json", "run make plan"),
+    "tradeoff": Part(_of_one(tradeoff), "docs/accuracy.md", "tradeoff", "run make tradeoff",
+                     "tradeoff.json", {name: name for name in ("tradeoff.png", "depth.png")}),
+    "plan": Part(_of_one(plan), "docs/performance.md", "plan --json", "run make plan"),
+    "sweep": Part(_of_one(swept), "docs/thesis.md", "sweep --json", "run make sweeps"),
     "energy": Part(energy, "docs/energy.md", "info --energy --json", "run make energy"),
+    "realtime": Part(realtime, "docs/realtime.md", "compare",
+                     "run compare with the methods fast and exact, or all", "compare.json",
+                     {"realtime.jpg": "fast.png"}),
 }  # fmt: skip
 
 
@@ -284,21 +349,30 @@ _LONG = ("tradeoff", "energy")
     option("measured", metavar="FILE", type=Path, nargs="+", help="JSON, or a folder"),
     option("-o", "--output", metavar="FILE", type=Path, help="page; default: the one in docs"),
     option("--images", metavar="FOLDER", type=Path, default=Path("docs/images")),
+    option(
+        "--pictures", metavar="FOLDER", type=Path,
+        help="a folder with larger pictures; default: the first that is measured",
+    ),
 )  # fmt: skip
 def main(args: argparse.Namespace) -> None:
     """Write the tables of one part into its page."""
     part = PARTS[args.part]
-    texts: dict[str, str] = {}
-    for measurement in args.measured:
-        file = measurement / f"{args.part}.json" if part.pictures else measurement
-        parts = from_json(
-            file, partial(part.tables, name=file.stem), writer=part.writer, remedy=part.remedy
-        )
-        for name, text in parts.items():  # a table goes on with the rows of the next file
-            rows = text.split("\n", 2)[-1]
-            texts[name] = f"{texts[name]}\n{rows}" if name in texts else text
+
+    def checked(document: dict[str, Any]) -> dict[str, Any]:
+        part.tables([("", document)])  # what is missing is missed here
+        return document
+
+    files = [measured / part.document for measured in args.measured]
+    documents = [
+        (file.stem, from_json(file, checked, writer=part.writer, remedy=part.remedy))
+        for file in files
+    ]
     update = long_tables.update if args.part in _LONG else pages.update
-    update(args.output or Path(part.page), texts)
-    for name in part.pictures:
-        with atomic_path(args.images / name) as temporary:
-            shutil.copyfile(args.measured[0] / name, temporary)
+    update(args.output or Path(part.page), part.tables(documents))
+    for target, name in part.pictures.items():
+        file = (args.pictures or args.measured[0]) / name
+        if target.endswith(".jpg"):
+            write_jpeg(file, args.images / target, width=_WIDTH)
+            continue
+        with atomic_path(args.images / target) as temporary:
+            shutil.copyfile(file, temporary)

@@ -10,11 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import subprocess
-import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,17 +51,10 @@ def field(file: Path, pixels: int) -> None:
 
 def built(scan: Path, pixels: int, more: Sequence[str] = ()) -> Run:
     """Run `precompute` in a process of its own."""
-    command = [
-        sys.executable, "-m", "mitsuba_diffraction", "precompute", str(scan), "--pixel-size",
-        str(EXTENT / pixels), "-o", str(scan.with_suffix(".exr")), *SETTINGS, *more,
-    ]  # fmt: skip
-    start = time.perf_counter()
-    process = subprocess.Popen(command)
-    _, status, used = os.wait4(process.pid, 0)
-    if status:
-        raise subprocess.CalledProcessError(status, command)
-    seconds = time.perf_counter() - start
-    return Run(DiffractionTable.load(scan.with_suffix(".exr")), seconds, 1024 * used.ru_maxrss)
+    file = scan.with_suffix(".exr")
+    words = ["precompute", scan, "--pixel-size", EXTENT / pixels, "-o", file, *SETTINGS, *more]
+    seconds, peak = pages.timed(words)
+    return Run(DiffractionTable.load(file), seconds.clock, peak)
 
 
 def agreement(

@@ -8,25 +8,18 @@ from __future__ import annotations
 import numpy as np
 
 from docs.make.validation.cases import Case, Light, Media, Sampled
-from docs.make.validation.light import heights_of, solved_by
+from docs.make.validation.light import heights_of, index_at, solved_by
 from docs.make.validation.model import modelled
 from mitsuba_diffraction.arrays import Real
-from mitsuba_diffraction.orders.solve import Chandezon, IntegralSolver, Solver, material_of
+from mitsuba_diffraction.orders.solve import Chandezon, IntegralSolver, Solver
 from mitsuba_diffraction.orders.solve.profiles import Profile
 
 _MODEL = "small_slope"
 
 
-def index_of(material: str | float, wavelength: float) -> complex:
-    """Return n + ik of a named metal or a number."""
-    index = material_of(material, (wavelength, wavelength)).index(wavelength)
-    assert index is not None
-    return complex(index)
-
-
 def mirror_reflectance(material: str, wavelengths: Real) -> Real:
     """Return the reflectance of a flat face along its normal."""
-    index = np.array([index_of(material, lam) for lam in wavelengths])
+    index = np.array([index_at(material, lam) for lam in wavelengths])
     return np.asarray(np.abs((index - 1) / (index + 1)) ** 2)
 
 
@@ -57,7 +50,7 @@ def _cases(
     surface = Sampled(heights_of(profile))
     lights = np.broadcast_arrays(wavelengths, angles)
     return [
-        Case(surface, Light(lam, theta), Media(index_of(material, lam), through=through))
+        Case(surface, Light(lam, theta), Media(index_at(material, lam), through=through))
         for lam, theta in zip(*(each.tolist() for each in lights), strict=True)
     ]
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from docs.make.validation.light import index_at
 from mitsuba_diffraction.arrays import Real
 from mitsuba_diffraction.optics.fresnel import Filmed, normal_reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
@@ -74,7 +75,7 @@ def _transmitted(groove: Groove, index: float = GLASS) -> Real:
 
 def _oxidised(bare: Real) -> Real:
     """Return efficiencies under the oxide, by the ratio of the reflectances of flat faces."""
-    aluminium = np.array([predict.index_of("Al", lam) for lam in _WAVELENGTHS])
+    aluminium = np.array([index_at("Al", lam) for lam in _WAVELENGTHS])
     index, thickness = _OXIDE
     film = Filmed(aluminium, np.full_like(aluminium, index), wavenumber(_WAVELENGTHS) * thickness)
     flat = [normal_reflectance(each) for each in (film, aluminium)]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,33 +13,29 @@ from mitsuba_diffraction.arrays import Real, Whole
 
 from .cases import Grating
 from .model import modelled
-from .solutions import LIGHTS, Solutions, Solved
+from .solutions import LIGHTS, Solutions
 
 #: Orders that leave closer to the surface than this are not counted: the model has no limit there.
 GRAZING = 75.0  # degrees
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Solved cases, and other efficiencies (n, 2) of the orders of each, for s and p light."""
-
-    solved: Sequence[Solved]
-    others: Sequence[Real]
+class Comparison(Solutions):
+    """Solved cases, with other efficiencies of the orders of each."""
 
     @cached_property
     def order(self) -> Whole:
         """Orders of all cases, (n, 2)."""
-        return Solutions(self.solved).column("order")
+        return self.column("order")
 
     @cached_property
     def exact(self) -> Real:
         """Their rigorous efficiencies for s and p light, (n, 2)."""
-        return Solutions(self.solved).column("powers")
+        return self.column("powers")
 
     @cached_property
     def by_light(self) -> Real:
         """Their other efficiencies for s and p light, (n, 2)."""
-        return np.concatenate(self.others)
+        return self.column("other")
 
     @property
     def rigorous(self) -> Real:
@@ -60,20 +55,9 @@ class Comparison:
     @cached_property
     def counted(self) -> NDArray[np.bool_]:
         """Orders that do not leave along the surface (`GRAZING`), (n,)."""
-        wo = Solutions(self.solved).column("wo")
+        wo = self.column("wo")
         # light from this angle is reflected at it
         return np.hypot(*wo[:, :2].T) <= np.sin(np.radians(GRAZING)) + 1e-9
-
-    def where(self, **values: Any) -> Comparison:
-        """The cases with these values, as `Solutions.where`."""
-        pairs = zip(self.solved, self.others, strict=True)
-        kept = [(solved, other) for solved, other in pairs if solved.case.has(**values)]
-        return Comparison([solved for solved, _ in kept], [other for _, other in kept])
-
-    def each(self) -> Iterator[Comparison]:
-        """Yield the comparison of each case."""
-        for solved, other in zip(self.solved, self.others, strict=True):
-            yield Comparison([solved], [other])
 
     def deviation(self, *, colours: bool = False, light: str | None = None) -> float:
         """Σ|η − η_rigorous| / Σ η_rigorous over the counted orders; NaN if there are none.
@@ -96,7 +80,7 @@ class Comparison:
     def change(self) -> float:
         """Change by the last refinement of the solver, in the measure of `deviation` of colours."""
         keep = self.counted & self.coloured
-        changed = Solutions(self.solved).column("change").mean(axis=1)
+        changed = self.column("change").mean(axis=1)
         return float(changed[keep].sum() / self.rigorous[keep].sum())
 
     def largest_relative(self, orders: int = 2) -> float:
@@ -126,14 +110,16 @@ def misplaced(
 def compare(solutions: Solutions, model: str = "kirchhoff") -> Comparison:
     """Evaluate a model (`model.MODELS`) for the solutions that have converged."""
     solved = solutions.trusted().solved
-    return Comparison(solved, [modelled(s.case, s.order, model) for s in solved])
+    return Comparison([replace(s, other=modelled(s.case, s.order, model)) for s in solved])
 
 
 def beside(first: Solutions, second: Solutions) -> Comparison:
     """The cases that two solvers solved: the `second` one's orders, the first one's as others."""
     known = {s.case: dict(zip(map(tuple, s.order), s.powers, strict=True)) for s in first.solved}
-    both = [s for s in second.solved if s.case in known]
-    return Comparison(both, [np.array([known[s.case][tuple(m)] for m in s.order]) for s in both])
+    both = (s for s in second.solved if s.case in known)
+    return Comparison(
+        [replace(s, other=np.array([known[s.case][tuple(m)] for m in s.order])) for s in both]
+    )
 
 
 def gratings_of(comparison: Comparison, profile: str) -> list[Grating]:

@@ -13,7 +13,6 @@ from mitsuba_diffraction.arrays import Real
 from .cases import PROFILES, Grating
 from .compare import Comparison, Sides, angles_of, compare, gratings_of, table_of
 from .models import ANGLES, BANDS, BOTH, banded, of_colours, within
-from .solutions import Solutions
 
 #: Largest deviation of colours on keratin at 60°, by profile and band of depth/period.
 KERATIN = {
@@ -133,8 +132,7 @@ def much_worse(sides: Sides) -> list[Selection]:
 
 def with_half(sides: Sides) -> Sides:
     """Comparisons by model, and by equal parts of both matrices."""
-    half = compare(Solutions(sides["kirchhoff"].solved), "half_and_half")
-    return {**sides, "half_and_half": half}
+    return {**sides, "half_and_half": compare(sides["kirchhoff"], "half_and_half")}
 
 
 def singles(sides: Sides) -> list[Selection]:

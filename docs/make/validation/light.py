@@ -83,6 +83,13 @@ def solved_by(solver: Solver, case: Case) -> Orders:
     return Orders(order[::-1], by_order.T[::-1])
 
 
+def index_at(material: str | complex, wavelength: float) -> complex:
+    """Return n + ik of a material that the solvers know, or of a number, at a wavelength (nm)."""
+    index = solve.material_of(material, (wavelength, wavelength)).index(wavelength)
+    assert index is not None
+    return complex(index)
+
+
 def heights_of(profile: Profile, pixels: int = PIXELS, rows: int = 2) -> HeightField:
     """Return one period of a profile as heights for the model."""
     places = (np.arange(pixels) + 0.5) / pixels * profile.period

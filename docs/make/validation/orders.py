@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -20,8 +20,8 @@ from mitsuba_diffraction.orders import solve
 
 from .cases import Case, Light, Media, Sampled
 from .compare import Comparison, compare
-from .light import heights_of, light_on, powers_of, solved_by
-from .solutions import Solutions, Solved
+from .light import heights_of, index_at, light_on, powers_of, solved_by
+from .solutions import Solved
 
 FOLDER = Path(__file__).parents[3] / "precompute" / "orders"
 #: Tables, and (θ, φ) of the light in degrees: across the grooves, oblique and along them.
@@ -80,17 +80,19 @@ class Shipped:
 
         theta, phi : of the light in air, degrees; a superstrate refracts it.
         """
-        superstrate, solved, by_table = self.recipe.superstrate, [], []
+        superstrate, solved = self.recipe.superstrate, []
         inside = float(np.degrees(np.arcsin(np.sin(np.radians(theta)) / superstrate)))
         for wavelength in wavelengths:
             light = Light(wavelength / superstrate, inside, phi)
-            case = Case(self.surface, light, Media(self._index(wavelength)))
+            index = index_at(self.recipe.material, wavelength) / superstrate
+            case = Case(self.surface, light, Media(index))
             found = solved_by(self.solver, case)
-            solved.append(Solved.between(case, found, found))
             x, y, _ = case.wi
             values = self.table.efficiency(-x, y, wavelength, found.order[:, 0])
-            by_table.append(np.repeat(values[:, None], 2, axis=1))
-        return compare(Solutions(solved), "small_slope"), Comparison(solved, by_table)
+            by_table = np.repeat(values[:, None], 2, axis=1)
+            solved.append(replace(Solved.between(case, found, found), other=by_table))
+        table = Comparison(solved)
+        return compare(table, "small_slope"), table
 
     def diffuse(self, samples: int = SAMPLES) -> Iterator[tuple[str, list[float]]]:
         """Yield each kind of light, and the deviations from the table's own solver in it.
@@ -138,13 +140,6 @@ class Shipped:
         grating = solve.Grating(recipe.profile, material, recipe.superstrate, alone)
         powers = powers_of(solver, light_on(grating, x, y, lam))
         return {m: float(power.mean()) for m, power in powers.items()}
-
-    def _index(self, wavelength: float) -> complex:
-        """Return the index over that of the superstrate."""
-        recipe = self.recipe
-        index = solve.material_of(recipe.material, recipe.settings.wavelengths).index(wavelength)
-        assert index is not None
-        return complex(index) / recipe.superstrate
 
     @cached_property
     def solver(self) -> solve.Solver:

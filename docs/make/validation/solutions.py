@@ -6,11 +6,11 @@ import importlib.metadata
 import json
 import os
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,7 @@ class Solved:
     Attributes
     ----------
     change : (n, 2) by how much the powers changed when the resolution grew to its final value.
+    other : (n, 2) efficiencies by a model or another solver, in comparisons.
     """
 
     case: Case
@@ -75,6 +76,7 @@ class Solved:
     change: Real
     balance: Real
     jones: Complex
+    other: Real | None = None
 
     @classmethod
     def between(cls, case: Case, coarse: Orders, fine: Orders) -> Solved:
@@ -97,11 +99,6 @@ class Solved:
         """Directions of the orders, (n, 3)."""
         return self.case.wo(self.order)
 
-    @property
-    def efficiency(self) -> Real:
-        """Efficiencies for unpolarised light, (n,)."""
-        return self.powers.mean(axis=1)
-
 
 @dataclass(frozen=True)
 class Solutions:
@@ -110,13 +107,17 @@ class Solutions:
     solved: Sequence[Solved]
     about: Mapping[str, Any] = field(default_factory=dict)
 
-    def where(self, **values: Any) -> Solutions:
+    def where(self, **values: Any) -> Self:
         """The cases with these values: a grating, or such as profile="lamellar" or theta=30.0."""
-        return Solutions([s for s in self.solved if s.case.has(**values)], self.about)
+        return replace(self, solved=[s for s in self.solved if s.case.has(**values)])
 
-    def trusted(self) -> Solutions:
+    def trusted(self) -> Self:
         """The cases that have converged."""
-        return Solutions([s for s in self.solved if s.converged], self.about)
+        return replace(self, solved=[s for s in self.solved if s.converged])
+
+    def each(self) -> Iterator[Self]:
+        """Yield each case alone."""
+        return (replace(self, solved=[s]) for s in self.solved)
 
     def column(self, name: str) -> NDArray[Any]:
         """An attribute of the orders of all cases."""

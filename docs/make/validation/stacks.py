@@ -15,10 +15,9 @@ from mitsuba_diffraction.reference import fresnel
 
 from . import crossed
 from .cases import Case, Light, Media, Sampled
+from .light import index_at
 from .solutions import imported
 
-# Wavelengths of the structures, nm
-_RANGE = (500.0, 600.0)
 #: Silica and another oxide, from the substrate upwards: indices, and thicknesses in µm.
 MIRROR = (("1.46", 0.1), ("1.95", 0.075)) * 3
 #: Silica ridges on a dielectric mirror for s light of 532 nm at 45°: period, depth, µm, and duty.
@@ -134,7 +133,7 @@ def _transfer_matrices() -> Iterator[Compared]:
         "a film, a mirror of 6 layers, aluminium": (lamellar(0.5, 0.0), metal),
         "three films on aluminium, slopes": (sinusoidal(0.5, 1e-9), sloped),
     }
-    aluminium = complex(solve.material_of("Al", _RANGE).index(lam)[()])
+    aluminium = index_at("Al", lam)
     stacks = (
         ([1.0, 1.38, *(1.95, 1.46) * 3, aluminium], [120.0, *(75.0, 100.0) * 3]),
         ([1.0, 1.38, 2.3 + 0.01j, 1.46, aluminium], [120.0, 60.0, 80.0]),

@@ -12,14 +12,14 @@ from docs.make.figures.long_tables import LONG
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights.formats.catalogue import ARRAYS, OPTICAL, PROBES
 from tests.support import ROOT
-from tests.support.pages import PAGES
+from tests.support.pages import PAGES, markers
 
 
 @pytest.mark.parametrize("page", interfaces.PAGES)
 def test_the_page_has_what_the_code_says(page):
     remedy = "python -m docs.make.figures.interfaces -o docs"
     made = interfaces.PAGES[page]()
-    assert pages.markers(ROOT / "docs" / page) == list(made)
+    assert markers(PAGES[f"docs/{page}"]) == list(made)
     for name, text in made.items():
         assert pages.part(PAGES[f"docs/{page}"], name) == text, remedy
 

@@ -47,9 +47,9 @@ def page(folder: Path, name: str) -> Path:
     return file
 
 
-def written(folder: Path, name: str, *documents: dict[str, Any]) -> str:
+def written(folder: Path, name: str, *documents: dict[str, Any], part: str | None = None) -> str:
     """What the page shows of documents."""
-    target, files = page(folder, name), []
+    target, files = page(folder, part or name), []
     for n, document in enumerate(documents):
         files.append(folder / f"{name}{n}.json")
         files[-1].write_text(json.dumps(document), "utf-8")
@@ -106,3 +106,12 @@ def test_energy_has_rows_of_all_files(tmp_path):
     assert glass.endswith("| 100 % | – | – |")
     assert metal.endswith("| 96 % | 0.963–0.996 | 98 % |")
     assert others == [line.replace("energy0", "energy1") for line in (glass, metal)]
+
+
+def test_a_sweep_has_a_row_for_each_value(tmp_path):
+    steps = [{"value": nm, "delta_e_mean": apart} for nm, apart in ((1.0, 0.0), (5.0, 1.06))]
+    report = {"sweep": "wavelength-step", "steps": steps}
+    rows = written(tmp_path, "sweep", report, part="wavelength-step").splitlines()[2:-2]
+    assert rows[2:] == ["| 1 nm | reference |", "| 5 nm | 1.1 |"]
+    report = {"sweep": "light-angle", "steps": [{"value": 30.0, "delta_e_mean": None}]}
+    assert "| 30° |  |" in written(tmp_path, "sweep", report, part="light-angle")

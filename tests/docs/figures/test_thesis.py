@@ -9,7 +9,6 @@ from docs.make.figures import pages, pictures, thesis
 from mitsuba_diffraction.analysis.pictures import colour_field, patches_figure
 from mitsuba_diffraction.heights.gratings import cd, elaphe_like
 from mitsuba_diffraction.thesis import methods
-from mitsuba_diffraction.thesis.sweeps import SWEEPS
 from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
@@ -26,25 +25,6 @@ def test_the_table_of_methods_is_made_by_one_command(tmp_path, capsys, some_vari
     rows = {line.split("|")[1].strip(): line.split("|") for line in text.splitlines()[2:9]}
     assert set(rows) == {*(f"`{n}`" for n in methods.NAMES), "nmm, lobes"}
     assert float(rows["`flss`"][3]) == 1.0
-
-
-def test_the_page_of_sweeps_is_made_by_one_command(tmp_path, capsys):
-    page = tmp_path / "thesis.md"
-    page.write_text((DOCS / "thesis.md").read_text(encoding="utf-8"), encoding="utf-8")
-    (tmp_path / "images").mkdir()
-    assert thesis.main(["sweeps", "-o", str(page), "--small", "--resolution", "8"]) == 0, (
-        capsys.readouterr()
-    )
-    text = page.read_text(encoding="utf-8")
-    kinds = [kind for kind in SWEEPS if kind in pages.markers(page)]
-    assert kinds
-    for kind in kinds:
-        parameter = SWEEPS[kind]
-        rows = pages.part(text, kind).splitlines()[2:]
-        assert len(rows) == len(parameter.values)
-        assert ("reference" in pages.part(text, kind)) == (parameter.reference is not None)
-        with Image.open(tmp_path / "images" / f"sweep-{kind}.png") as image:
-            assert image.size[0] > 400
 
 
 def test_the_periods_are_made_by_one_command(tmp_path, capsys):

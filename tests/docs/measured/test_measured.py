@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.make.figures.pages import markers, part
+from docs.make.figures.pages import part
 from docs.make.measured import cases, predict
 from docs.make.measured.__main__ import main
 from docs.make.measured.grooves import Groove
 from docs.make.validation.light import heights_of
-from tests.support import ROOT
-from tests.support.pages import PAGES
+from tests.support.pages import PAGES, markers
 
 pytest.importorskip("gratinglab")
 
@@ -68,7 +67,7 @@ def test_the_page_is_whole(tmp_path, capsys):
     assert main(["--quick", "-o", str(tmp_path)]) == 0
     text = page.read_text(encoding="utf-8")
     assert not re.search(r"\bnan\b", text)
-    assert markers(page) == markers(ROOT / "docs/validation/measured.md")
+    assert markers(text) == markers(PAGES["docs/validation/measured.md"])
     # another renderer's maps are kept: their clone was not given
     assert part(text, "pictures") == part(PAGES["docs/validation/measured.md"], "pictures")
     for name in ("agreement-with-measurements", "what-was-fitted"):

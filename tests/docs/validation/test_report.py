@@ -6,11 +6,12 @@ import re
 
 import pytest
 
-from docs.make.figures.pages import markers, part
+from docs.make.figures.pages import part
 from docs.make.validation.__main__ import main
 from docs.make.validation.pages.markdown import joined, percent, table
 from docs.make.validation.pages.report import PAGES, page_path
 from tests.support import ROOT
+from tests.support.pages import markers
 
 pytestmark = pytest.mark.thorough
 
@@ -38,8 +39,8 @@ def test_the_report_is_whole(blank, capsys):
         page = page_path(blank, name)
         assert str(page) in printed
         text = page.read_text(encoding="utf-8")
-        assert markers(page)
-        for part_name in markers(page):
+        assert markers(text)
+        for part_name in markers(text):
             assert part(text, part_name), f"{name}: nothing writes {part_name}"
         assert "nan" not in text
         assert "\n[Table of" in text or text.count("\n|") > 2  # head, rule and a row

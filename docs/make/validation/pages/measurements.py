@@ -38,11 +38,6 @@ class Measurements:
         }
 
     @property
-    def kirchhoff(self) -> dict[str, Comparison]:
-        """Kirchhoff's model on gratings, by material."""
-        return {material: sides["kirchhoff"] for material, sides in self.gratings.items()}
-
-    @property
     def default(self) -> dict[str, Comparison]:
         """Small slope on gratings, by material."""
         return {material: sides["small_slope"] for material, sides in self.gratings.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mitsuba_diffraction.heights import GENTLE_SLOPE, STEEP_SLOPE
 
 from ..cases import PROFILES, Case, Grating
-from ..compare import Comparison, angles_of, gratings_of, table_of
+from ..compare import Comparison, Sides, angles_of, gratings_of, table_of
 from ..limits import GENTLE_ERROR, STEEP_ERROR
 from ..models import of_colours
 from ..statistics import CORRELATION, THETA, WAVELENGTH, Statistics, exact_lobe
@@ -23,15 +23,16 @@ from .markdown import percent
 _SMALLEST = 1e-4  # deviations below it are drawn on it
 
 
-def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Comparison]) -> Figure:
+def slopes_figure(gratings: Mapping[str, Sides]) -> Figure:
     """Deviation of the colours of sinusoids against RMS slope, at every angle, by material."""
-    figure, axes = _figure(11.5, 4.8, len(default))
-    for panel, (material, blend) in zip(axes, default.items(), strict=True):
+    figure, axes = _figure(11.5, 4.8, len(gratings))
+    for panel, (material, sides) in zip(axes, gratings.items(), strict=True):
+        blend = sides["small_slope"]
         sinusoids = gratings_of(blend, "sinusoidal")
         slopes = np.array([grating.field.rms_slope for grating in sinusoids])
         angles = angles_of(blend.where(profile="sinusoidal"))
         for part, marker, fill, name in (
-            (kirchhoff[material], "s", "none", "Kirchhoff"),
+            (sides["kirchhoff"], "s", "none", "Kirchhoff"),
             (blend, "o", None, "default"),
         ):
             table = np.maximum(table_of(part, sinusoids, angles, of_colours), _SMALLEST)

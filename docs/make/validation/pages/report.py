@@ -46,7 +46,7 @@ _EXAMPLES = (
 )
 #: Function that draws each picture images/validation_NAME.png, by page.
 _PICTURES: dict[str, tuple[str, Callable[[Measurements], Figure]]] = {
-    "validation": ("slopes", lambda m: plots.slopes_figure(m.kirchhoff, m.default)),
+    "validation": ("slopes", lambda m: plots.slopes_figure(m.gratings)),
     "conductor": ("orders", lambda m: plots.orders_figure(m.perfect, list(_EXAMPLES), 30.0)),
     "solutions": (
         "materials",
