@@ -96,8 +96,8 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
             f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
             "places on the surface; unwrap it, or use coherence='ensemble'"
         )
-    stretching = [_attribute(surface.lateral_scale.texture) for surface in surfaces]
-    attributes = [name for part in parts_of(shape.bsdf()) if (name := _attribute(part))]
+    stretching = [attribute_of(surface.lateral_scale.texture) for surface in surfaces]
+    attributes = [name for part in parts_of(shape.bsdf()) if (name := attribute_of(part))]
     for name in dict.fromkeys(attributes):
         if np.all(shape.has_attribute(name)):
             if name in stretching and (least := np.array(mi.traverse(shape)[name]).min()) <= 0.0:
@@ -116,7 +116,7 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
         )
 
 
-def _attribute(thing: Any) -> str:
+def attribute_of(thing: Any) -> str:
     """Return the name of the attribute that a texture reads; empty for anything else."""
     if thing is None or not is_attribute(thing):
         return ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,8 +13,9 @@ from numpy.typing import NDArray
 from ...arrays import Real
 from ...errors import DiffractionError
 from ...plugin.description import Mix, Surface
-from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
+from ...scene.elements import attribute_of
+from .lanes import evaluated, uploaded
 from .packing import colour_weights
 
 #: Wavelengths (n,) in nm, and values (n,).
@@ -72,8 +72,7 @@ def raw_picture(bsdf: Any, name: str, channels: int, scale: float, shift: float 
 
 def colour_map(texture: Any, light: Spectrum) -> Map:
     """Return a texture of reflectances in linear sRGB, to be multiplied with the light's colour."""
-    attribute = _attribute(texture)
-    if attribute is not None:
+    if attribute := attribute_of(texture):
         return Map(np.ones(3), attribute=attribute)
     import mitsuba as mi
 
@@ -118,8 +117,8 @@ def axis_map(described: Surface) -> Map:
     if turned.texture is None and stretched.texture is None:
         angle = np.radians(turned.number)
         return Map(np.array([np.cos(angle), np.sin(angle), stretched.number]))
-    attribute = None if turned.texture is None else _attribute(turned.texture)
-    if attribute is not None and stretched.texture is None:
+    attribute = attribute_of(turned.texture)
+    if attribute and stretched.texture is None:
         return Map(np.array([1.0, 0.0, stretched.number]), attribute=attribute)
 
     def frame(uv: Real) -> Real:
@@ -156,7 +155,7 @@ def _picture(textures: Sequence[Any], look_up: Callable[[Real], Real], name: str
     """Evaluate a function of textures at the texels of the largest one."""
     sizes, transforms = [], []
     for texture in textures:
-        if _attribute(texture) is not None:
+        if attribute_of(texture):
             raise DiffractionError(
                 f"{name}: a mesh attribute is not supported by the shaders; use textures, or "
                 "render the scene with Mitsuba"
@@ -197,14 +196,6 @@ def _clamps(look_up: Callable[[Real], NDArray[np.floating]], to_uv: Real) -> boo
     return bool(np.abs(beyond - values(1e-4)).sum() < np.abs(beyond - values(0.7)).sum())
 
 
-def _attribute(texture: Any) -> str | None:
-    """Return the name of the mesh attribute that a texture reads, or None."""
-    if texture.class_name() != "MeshAttribute":
-        return None
-    match = re.search(r'name = "?(\w+)', str(texture))
-    return match[1] if match else None
-
-
 def _centres(texture: Any, width: int, height: int) -> tuple[Real, Real]:
     """Return (u, v) of the centres of all texels, and the texture's transform of coordinates."""
     import mitsuba as mi
@@ -226,26 +217,3 @@ def _interaction(uv: Real) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, len(uv))
     si.uv = mi.Point2f(*uploaded(uv))
     return si
-
-
-def uploaded(rows: NDArray[np.generic]) -> list[Any]:
-    """Upload the columns of an array (n, m) in single precision."""
-    import mitsuba as mi
-
-    return [upload(mi.Float, column.astype(np.float32)) for column in rows.T]
-
-
-def evaluated(texture: Any, uv: Real, wavelengths: Real) -> NDArray[np.float32]:
-    """Evaluate a texture: (points, wavelengths), or (points, 3) in RGB variants."""
-    import mitsuba as mi
-
-    si = _interaction(uv)
-    parts = []
-    step = 4 if mi.is_spectral else len(wavelengths)
-    for start in range(0, len(wavelengths), step):
-        if mi.is_spectral:
-            si.wavelengths = mi.Spectrum(*(float(w) for w in wavelengths[start : start + 4]))
-        value = np.array(texture.eval(si), np.float32)
-        value = value.reshape(value.shape[0], -1)
-        parts.append(np.broadcast_to(value, (value.shape[0], len(uv))))
-    return np.concatenate(parts).T
