@@ -23,6 +23,19 @@ _STEM = 60
 _in_use: set[Path] = set()
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, and the folders above it, unless it exists.
+
+    Raises a DiffractionError if it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot make the folder '{folder}': {error.strerror}; choose another"
+        ) from error
+
+
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it there on success, remove it otherwise.

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
 from ..errors import DiffractionError, one_line, quoted
 from ..optics.boundary import MODELS
 from ..optics.colour import WORKING_SPACES, daylight_shares
@@ -126,12 +126,7 @@ def export(bsdf: Any, folder: str | os.PathLike[str], name: str = "diffraction")
     check_name(name)
     shader = shader_of(OSL.described(bsdf))
     path = Path(folder)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DiffractionError(
-            f"cannot write into '{path}': {error.strerror}; choose a folder that can be made"
-        ) from error
+    make_folder(path)
     files = {
         key: path / f"{name}_{key.removesuffix('File').lower()}.exr" for key in shader.textures
     }

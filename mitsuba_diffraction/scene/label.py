@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from ..arrays import Real
-from ..atomic import atomic_path
+from ..atomic import atomic_path, make_folder
 from ..errors import DiffractionError
 from ..gltf import named_files
 from ..plugin.presets import PATCHES
@@ -245,10 +245,7 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
 
     Raises a DiffractionError if the folder cannot be written to.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DiffractionError(f"cannot make the folder '{folder}': {error.strerror}") from error
+    make_folder(folder)
     ring, tangential = geometry(place.elevations)
     linear = place.matrix[:, :2]
     # degrees from the first tangent, in the label's plane, to the label's upward direction
@@ -266,7 +263,7 @@ def write(folder: Path, parts: Areas, place: LabelPlace, mesh: Path | None, **va
     for name, source in copies.items():
         if (folder / name).exists() and source.samefile(folder / name):
             continue  # the mesh lies in the folder
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        make_folder((folder / name).parent)
         with atomic_path(folder / name) as temporary:
             shutil.copyfile(source, temporary)
     ny, nx = foil.weight.shape

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...atomic import atomic_path
-from ...errors import DiffractionError
+from ...atomic import atomic_path, make_folder
 from ...plugin.description import Consumer, Feature, Surface
 from ...tables import write_channels
 from .maps import Map
@@ -152,12 +151,7 @@ def export_shader(
     Raises a DiffractionError as `make_shader` does, or if the folder cannot be written.
     """
     folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DiffractionError(
-            f"cannot write into '{folder}': {error.strerror}; choose another folder"
-        ) from error
+    make_folder(folder)
     shader = make_shader(bsdf, methods)
     for texture in shader.textures:
         # the first line of the file is the texture's last row

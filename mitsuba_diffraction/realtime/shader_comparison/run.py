@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...atomic import make_folder
 from ...errors import DiffractionError, warn
 from ...progress import Progress, Stages, silent
 from ...scene.passes import Stop, render_passes
@@ -116,7 +117,7 @@ class Comparison:
                 sensor = box_sensor(camera)
                 full = self._path_trace(self.scene, sensor, self.full_spp, self.seed, stop)
         exposure = exposure_of(direct.mean)
-        self._make_folder()
+        make_folder(self.folder)
         self._write(direct.mean, "direct", self.spp)
         if full is not None:
             self._write(full, "full", self.full_spp)
@@ -233,15 +234,6 @@ class Comparison:
         if result.interrupted:
             raise KeyboardInterrupt
         return np.array(result.bitmap, np.float32)[..., :3]
-
-    def _make_folder(self) -> None:
-        """Create the folder of pictures."""
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise DiffractionError(
-                f"cannot make the folder '{self.folder}': {error.strerror}; choose another"
-            ) from error
 
     def _write(self, image: Any, name: str, samples: int) -> None:
         """Write a picture as EXR, with scene, variant and samples per pixel."""
