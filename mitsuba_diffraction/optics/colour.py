@@ -77,11 +77,20 @@ def daylight_shares(wavelengths: ArrayLike) -> NDArray[np.float64]:
     """Weights (n, 3) of values at wavelengths (n,), nm, in red, green and blue under daylight.
 
     Values are linear in log λ in between. The weights of a colour add up to 1; some are negative.
+    The result is cached, and read-only.
     """
-    light, nodes = np.arange(360.0, 830.5, 2.0), np.log(np.asarray(wavelengths, np.float64))
+    return _daylight_shares(np.asarray(wavelengths, np.float64).tobytes())
+
+
+@functools.lru_cache(maxsize=64)
+def _daylight_shares(wavelengths: bytes) -> NDArray[np.float64]:
+    """Return `daylight_shares` of the bytes of an array (n,), read-only."""
+    light, nodes = np.arange(360.0, 830.5, 2.0), np.log(np.frombuffer(wavelengths))
     hats = [np.interp(np.log(light), nodes, row) for row in np.eye(len(nodes))]
     weights = np.stack(hats) @ linear_srgb(response(light))
-    return np.asarray(weights / weights.sum(axis=0))
+    weights /= weights.sum(axis=0)
+    weights.flags.writeable = False
+    return weights
 
 
 def illuminant_power(name: str, wavelength: ArrayLike) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..atomic import atomic_path, make_folder
 from ..errors import DiffractionError, one_line, quoted
 from ..optics.boundary import MODELS
-from ..optics.colour import WORKING_SPACES, linear_srgb, response
+from ..optics.colour import WORKING_SPACES, daylight_shares
 from ..orders import OrderTable
 from ..plugin.description import Consumer, Feature, Surface
 from ..shading import dialects
@@ -265,8 +265,7 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
         raise DiffractionError(refusal)
     colour = places[0]
     if len(colour) > 3:
-        weights = linear_srgb(response(lam))
-        colour = colour @ weights / weights.sum(axis=0)
+        colour = colour @ daylight_shares(lam)
     # mono variants have one number
     red, green, blue = (float(max(value, 0.0)) for value in np.resize(colour, 3))
     return red, green, blue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Callable
 from importlib import resources
 from typing import Any
 
@@ -17,14 +18,9 @@ from ..optics.coat import (
 )
 from ..optics.fresnel import reflectance
 from ..optics.geometry import horizon_attenuation
-from ..optics.orders import (
-    cell_wavelengths,
-    order_cell,
-    order_direction,
-    smooth_coordinate,
-    wavelength_coordinate,
-)
+from ..optics.orders import order_direction
 from ..shading.dialects import OSL
+from ..shading.orders import FORMULAS
 from ..shading.pair_power import Coat, pair_power
 from ..shading.programs import Program
 
@@ -42,12 +38,12 @@ def shader_file(name: str) -> str:
 
 
 def order_formulas() -> str:
-    """Return the functions of `optics` that `shaders/orders.osl` calls."""
+    """Return the formulas that `shaders/orders.osl` calls."""
     program = _program()
-    for formula, count in (
-        (order_cell, 5), (smooth_coordinate, 1), (cell_wavelengths, 4), (wavelength_coordinate, 4),
-        (face_transmittance, 2), (passage, 2), (order_direction, 4),
-    ):  # fmt: skip
+    functions: dict[Callable[..., Any], int] = {
+        **FORMULAS, face_transmittance: 2, passage: 2, order_direction: 4,
+    }  # fmt: skip
+    for formula, count in functions.items():
         program.add(formula, *["float"] * count)
     return program.text
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..optics.orders import least_c
 from ..orders import OrderTable
-from ..orders.rows import kept, kinds_of, leaving_transmittance
-from ..shading.orders import PackedOrders, centres
+from ..orders.rows import kinds_of, leaving_transmittance
+from ..shading.orders import PackedOrders, centres, texture_constants
 from .spectrum import NODES, drawn_spectrum
 
 #: Largest size of the efficiencies, bytes.
@@ -36,27 +35,12 @@ def interpolation_error(table: OrderTable, packed: PackedOrders) -> dict[str, fl
 
 
 def order_constants(table: OrderTable, packed: PackedOrders) -> dict[str, float | int]:
-    """Return the constants of `shaders/orders.osl`; lengths in nm but for PERIOD, µm."""
-    (low, high), (least, most) = table.wavelengths, table.reach
+    """Return the constants of `shaders/orders.osl`; lengths in µm."""
     height, width = packed.pixels.shape[:2]
     return {
-        "PERIOD": table.period,
-        "OPTICAL_PERIOD": 1e3 * table.optical_period,
-        "INDEX": table.superstrate,
-        "KEPT": kept(table),
-        "LEAST_C": least_c(table.superstrate),
-        "LOW": low,
-        "HIGH": high,
-        "LEAST_LIT": least,
-        "MOST_LIT": most,
-        "BANDS": table.last_band + 1,
-        "TAU": packed.counts.tau,
-        "RHO": packed.counts.rho,
-        "W": packed.counts.w,
-        "GROUPS": packed.counts.w // 3,
+        **{name.upper(): value for name, value in texture_constants(table, packed).items()},
         "WIDTH": width,
         "HEIGHT": height,
-        "TILES_ACROSS": packed.columns,
         "SAMPLES": _samples(table.period),
         "LEAST": 1e-5,
         "PIGMENT_SHARE": _mean_remainder(table),

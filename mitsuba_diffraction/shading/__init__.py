@@ -6,7 +6,7 @@ symbols     numbers that record a formula's expressions
 programs    formulas written as functions of a shading language
 dialects    words of GLSL and OSL
 powers      powers of a patch's orders as textures
-orders      efficiencies of solved orders as a texture
+orders      efficiencies of solved orders as a texture, and formulas that read it
 pair_power  power of a boundary model for a pair of directions, under a coat or bare
 """
 

@@ -11,6 +11,7 @@ modelled       surfaces of `diffraction`: constants, energy conservation, tables
 solved         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
 lobes          directions drawn from lobes, and their densities
 maps           textures of materials
+lanes          values of textures and emitters for many samples and wavelengths
 lights         directions, points, spots, and a smooth sky
 emitters       all emitters of a scene as a sequence of lights
 shadows        shadow maps, and the triangles that cast shadows

@@ -14,7 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...arrays import Real
-from .maps import uploaded
+from .lanes import uploaded
 from .scene import RealtimeScene
 from .texels import Packed, pack_grid
 

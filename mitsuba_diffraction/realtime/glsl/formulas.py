@@ -21,25 +21,22 @@ from ...optics.fresnel import reflectance
 from ...optics.geometry import horizon_attenuation, vcavity
 from ...optics.mirror import horizon_correction, mirror_cosine
 from ...optics.orders import (
-    cell_wavelengths,
     lobe_falloff,
     lobe_peak,
-    order_cell,
     order_direction,
     order_lobe,
-    smooth_coordinate,
-    wavelength_coordinate,
     wavenumber_step,
 )
 from ...shading.dialects import GLSL
+from ...shading.orders import FORMULAS
 from ...shading.pair_power import Coat, relative_power
 from ...shading.programs import Program
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
 _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "ORDERS": {
-        order_cell: 5, smooth_coordinate: 1, cell_wavelengths: 4, wavelength_coordinate: 4,
-        order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4, horizon_correction: 3,
+        **FORMULAS, order_lobe: 3, lobe_peak: 2, wavenumber_step: 3, lobe_falloff: 4,
+        horizon_correction: 3,
     },
     "FACE": {face_transmittance: 2, passage: 2, order_direction: 4},
     "ORDER_0": {horizon_correction: 3, mirror_cosine: 4},

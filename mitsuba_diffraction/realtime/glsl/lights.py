@@ -10,9 +10,10 @@ import numpy as np
 from ...arrays import Real
 from ...optics.colour import daylight
 from ...scene.elements import name_of
-from .maps import uploaded
+from .lanes import Lanes
 from .packing import daylight_colour
 
+_WAVES = np.linspace(360.0, 830.0, 96)  # of spectra of light, nm
 _SAMPLES = 1024  # samples of a light with an extent
 #: Radius around the sun, rad, whose light is the sun's: its disc has 0.27°.
 AROUND_SUN = np.radians(0.6)
@@ -189,17 +190,15 @@ def sampled_directions(
     Returns irradiances over density (samples, wavelengths), or (samples, wavelengths, 3) in RGB
     variants, relative to D65; directions (samples, 3), distances (samples,), and wavelengths in nm.
     """
-    import drjit as dr
     import mitsuba as mi
 
-    lanes = _Lanes(samples)
-    si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
+    lanes = Lanes(samples, _WAVES)
+    si = lanes.interaction()
     si.p = mi.Point3f(*(mi.Float(float(x)) for x in point))
-    lanes.set_wavelengths(si)
-    sample, weight = emitter.sample_direction(si, lanes.points(start))
+    sample, weight = emitter.sample_direction(si, _points(lanes, start))
     directions = lanes.vectors(sample.d)
     distances = np.broadcast_to(np.array(sample.dist, np.float64).ravel(), (lanes.count,))
-    values, wavelengths = lanes.spectra(weight)
+    values, wavelengths = _relative(lanes, weight)
     return values, directions, distances[:: lanes.quads], wavelengths
 
 
@@ -209,32 +208,46 @@ def sampled_positions(emitter: Any, samples: int, start: int = 0) -> tuple[Real,
     Returns radiances times the area as of `sampled_directions`; positions and normals (samples, 3),
     and wavelengths in nm.
     """
-    import drjit as dr
     import mitsuba as mi
 
-    lanes = _Lanes(samples)
-    sample, weight = emitter.sample_position(0.0, lanes.points(start))
-    si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
+    lanes = Lanes(samples, _WAVES)
+    sample, weight = emitter.sample_position(0.0, _points(lanes, start))
+    si = lanes.interaction()
     si.p, si.n, si.uv = sample.p, sample.n, sample.uv
     si.wi = mi.Vector3f(0.0, 0.0, 1.0)
-    lanes.set_wavelengths(si)
-    values, wavelengths = lanes.spectra(emitter.eval(si) * weight)
+    values, wavelengths = _relative(lanes, emitter.eval(si) * weight)
     return values, lanes.vectors(sample.p), lanes.vectors(sample.n), wavelengths
 
 
 def radiance_along(emitter: Any, directions: Real) -> Real:
     """Return the radiance of an environment from directions (n, 3), linear sRGB (n, 3)."""
-    import drjit as dr
     import mitsuba as mi
 
-    lanes = _Lanes(len(directions))
-    si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
+    lanes = Lanes(len(directions), _WAVES)
+    si = lanes.interaction()
     si.wi = mi.Vector3f(*lanes.uploaded(-directions))
-    lanes.set_wavelengths(si)
-    values, waves = lanes.spectra(emitter.eval(si))
+    values, waves = _relative(lanes, emitter.eval(si))
     if values.ndim == 3:
         return values[:, 0]
     return values @ np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
+
+
+def _points(lanes: Lanes, start: int) -> Any:
+    """Return points of the plastic number's sequence in the unit square (Roberts 2018)."""
+    import mitsuba as mi
+
+    number = np.arange(start, start + lanes.samples)[:, None]
+    return mi.Point2f(*lanes.uploaded((0.5 + number * [0.7548776662, 0.5698402910]) % 1.0))
+
+
+def _relative(lanes: Lanes, values: Any) -> tuple[Real, Real]:
+    """Read values as of `sampled_directions`, and the wavelengths."""
+    import mitsuba as mi
+
+    spectra = lanes.spectra(mi.unpolarized_spectrum(values)).astype(np.float64)
+    if not mi.is_spectral:
+        return np.repeat(spectra[:, None], 2, axis=1), np.array([360.0, 830.0])
+    return spectra / daylight(lanes.wavelengths), lanes.wavelengths
 
 
 def area_of(shape: Any) -> float:
@@ -246,49 +259,3 @@ def emitted_radiance(shape: Any) -> Real:
     """Return the mean radiance that a shape emits, linear sRGB (3,)."""
     values, _, _, waves = sampled_positions(shape.emitter(), 64)
     return daylight_colour(waves, values.mean(axis=0) / area_of(shape))
-
-
-class _Lanes:
-    """Dr.Jit lanes of samples; in spectral variants one lane per sample and four wavelengths."""
-
-    def __init__(self, samples: int) -> None:
-        import mitsuba as mi
-
-        self.samples, self.quads = samples, 24 if mi.is_spectral else 1
-        self.count = samples * self.quads
-        self._waves = np.linspace(360.0, 830.0, 4 * self.quads)
-
-    def set_wavelengths(self, si: Any) -> None:
-        """Set the wavelengths of each lane."""
-        import mitsuba as mi
-
-        if mi.is_spectral:
-            waves = np.tile(self._waves.reshape(4, self.quads), self.samples)
-            si.wavelengths = mi.Spectrum(*uploaded(waves.T))
-
-    def points(self, start: int) -> Any:
-        """Return points of the plastic number's sequence in the unit square (Roberts 2018)."""
-        import mitsuba as mi
-
-        number = np.arange(start, start + self.samples)[:, None]
-        return mi.Point2f(*self.uploaded((0.5 + number * [0.7548776662, 0.5698402910]) % 1.0))
-
-    def uploaded(self, vectors: Real) -> list[Any]:
-        """Upload the components of a vector per sample (samples, n) to all lanes."""
-        return uploaded(np.repeat(vectors, self.quads, axis=0))
-
-    def vectors(self, values: Any) -> Real:
-        """Read one vector per sample, (samples, 3)."""
-        vectors = np.array(values, np.float64).T.reshape(-1, 3)
-        return np.broadcast_to(vectors, (self.count, 3))[:: self.quads]
-
-    def spectra(self, values: Any) -> tuple[Real, Real]:
-        """Read values as of `sampled_directions`, and the wavelengths."""
-        import mitsuba as mi
-
-        flat = np.array(mi.unpolarized_spectrum(values), np.float64)
-        flat = np.broadcast_to(flat.reshape(flat.shape[0], -1), (flat.shape[0], self.count))
-        if not mi.is_spectral:
-            return np.repeat(flat.T[:, None], 2, axis=1), np.array([360.0, 830.0])
-        spectra = flat.reshape(4, self.samples, self.quads).transpose(1, 0, 2)
-        return spectra.reshape(self.samples, -1) / daylight(self._waves), self._waves

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from ...arrays import Real
 from ...errors import DiffractionError
 from ...plugin.description import Mix, Surface
-from ...plugin.memory import upload
 from ...plugin.parameter_changes import children
 from ...scene.elements import attribute_of
+from .lanes import evaluated, uploaded
 from .packing import colour_weights
 
 #: Wavelengths (n,) in nm, and values (n,).
@@ -217,26 +217,3 @@ def _interaction(uv: Real) -> Any:
     si = dr.zeros(mi.SurfaceInteraction3f, len(uv))
     si.uv = mi.Point2f(*uploaded(uv))
     return si
-
-
-def uploaded(rows: NDArray[np.generic]) -> list[Any]:
-    """Upload the columns of an array (n, m) in single precision."""
-    import mitsuba as mi
-
-    return [upload(mi.Float, column.astype(np.float32)) for column in rows.T]
-
-
-def evaluated(texture: Any, uv: Real, wavelengths: Real) -> NDArray[np.float32]:
-    """Evaluate a texture: (points, wavelengths), or (points, 3) in RGB variants."""
-    import mitsuba as mi
-
-    si = _interaction(uv)
-    parts = []
-    step = 4 if mi.is_spectral else len(wavelengths)
-    for start in range(0, len(wavelengths), step):
-        if mi.is_spectral:
-            si.wavelengths = mi.Spectrum(*(float(w) for w in wavelengths[start : start + 4]))
-        value = np.array(texture.eval(si), np.float32)
-        value = value.reshape(value.shape[0], -1)
-        parts.append(np.broadcast_to(value, (value.shape[0], len(uv))))
-    return np.concatenate(parts).T

@@ -16,8 +16,8 @@ from ...plugin.description import Feature, Surface
 from ...progress import show, tracked
 from ...tables.colour.table import cached_colours
 from ...tables.directional import DirectionalTable
+from .lanes import evaluated
 from .lobes import colour_power, pack_lobes
-from .maps import evaluated
 from .packing import (
     pack_boundary,
     pack_colours,

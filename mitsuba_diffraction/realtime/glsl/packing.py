@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 
@@ -146,14 +145,8 @@ def colour_weights(wavelengths: Real, relative: Real | float = 1.0) -> Real:
 
     relative : spectrum (n,) of another light, relative to daylight.
     """
-    weights = (_daylight(wavelengths.tobytes()).T * relative).T
+    weights = (daylight_shares(wavelengths).T * relative).T
     return np.asarray(weights / weights.sum(axis=0))
-
-
-@functools.lru_cache(maxsize=8)
-def _daylight(wavelengths: bytes) -> Real:
-    """Return linear sRGB (n, 3) of daylight's wavelengths in nm, the bytes of an array (n,)."""
-    return np.asarray(linear_srgb(response(np.frombuffer(wavelengths))))
 
 
 def pack_responses(lights: Sequence[tuple[Real, Real]]) -> Packed:
@@ -176,8 +169,7 @@ def pack_responses(lights: Sequence[tuple[Real, Real]]) -> Packed:
 
 def daylight_colour(wavelengths: Real, spectrum: Real) -> Real:
     """Return linear sRGB (3,) of a spectrum relative to D65, as in `pack_responses`."""
-    values = np.stack([np.interp(_LAM, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
-    return np.asarray((_daylight(_LAM.tobytes()) * values).sum(axis=0))
+    return np.asarray((daylight_shares(wavelengths).T * spectrum.T).sum(axis=1))
 
 
 def pack_conductor(wavelengths: Real, eta: Real, k: Real) -> Packed:
@@ -200,7 +192,7 @@ def pack_conductor(wavelengths: Real, eta: Real, k: Real) -> Packed:
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
     fine = reflectances(_LAM)
-    rows[-1, :, :3] = fine.T @ colour_weights(_LAM)
+    rows[-1, :, :3] = fine.T @ daylight_shares(_LAM)
     tint = metal_tint(_LAM, fine[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),

@@ -144,7 +144,8 @@ class ProgressiveLight(Resources):
             else:
                 self._look_up(camera, numbers[6:8])
             self._sums[kind].frame.use()
-            self._add.draw({}, {"frame": self._frame.colour}, adding=True)
+            blended: dict[str, Uniform] = {"first": True, "covers": 1.0}
+            self._add.draw(blended, {"frame": self._frame.colour}, adding=True)
             self._counts[kind] += 1
 
     def _light(self, light: Lamp, camera: Camera, shift: Real) -> None:

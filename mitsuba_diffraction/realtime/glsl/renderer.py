@@ -220,16 +220,15 @@ class Renderer(Resources):
         }
         for n, surface in enumerate(self.scene.surfaces):
             parts = (bindings, self.bindings[n], tables[n], *(extras[n] if extras else ()))
-            program, array = self._program(method, n, parts)
-            unit = 0
-            for part in parts:
-                unit = part.use(program, unit)
-            self.use_responses(program, unit, lights)
+            program = self.program(method, parts)
+            self.bind(program, parts, lights)
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
             enable_sides(self.context, windings[n] if windings else 0)
-            array.render()
+            if (n, id(program)) not in self._arrays:
+                self._arrays[n, id(program)] = self.own(self.buffers[n].array(program))
+            self._arrays[n, id(program)].render()
 
     def release(self) -> None:
         """Free the graphics card's memory."""
@@ -249,8 +248,8 @@ class Renderer(Resources):
             self._tables[method] = [bound[number] for number in numbers]
         return self._tables[method]
 
-    def _program(self, method: str, number: int, parts: Sequence[Bindings]) -> tuple[Any, Any]:
-        """Return the program of a surface and its vertex array; both are cached.
+    def program(self, method: str, parts: Sequence[Bindings]) -> Any:
+        """Return the program of a surface, which is cached.
 
         parts : of the light, the surface, its table and its surroundings.
 
@@ -261,19 +260,22 @@ class Renderer(Resources):
             definitions |= part.definitions
         key = method, frozenset(definitions.items())
         if key not in self._programs:
-            parts_of_stage = fragment_parts(method, definitions)
-            program = compile_program(self.context, f"method {method}", parts_of_stage)
+            stage = fragment_parts(method, definitions)
+            program = compile_program(self.context, f"method {method}", stage)
             self._programs[key] = self.own(program)
-        if (number, key) not in self._arrays:
-            array = self.buffers[number].array(self._programs[key])
-            self._arrays[number, key] = self.own(array)
-        return self._programs[key], self._arrays[number, key]
+        return self._programs[key]
 
-    def use_responses(self, program: Any, unit: int, lights: Sequence[Lamp] | None = None) -> None:
-        """Bind the lights' spectra, and upload them if the lights have changed."""
+    def bind(self, program: Any, parts: Sequence[Bindings], lights: Sequence[Lamp]) -> None:
+        """Bind the parts of a surface in its program, and the lights' spectra.
+
+        The spectra are uploaded if the lights have changed.
+        """
+        unit = 0
+        for part in parts:
+            unit = part.use(program, unit)
         if "responses" not in program:
             return
-        pairs = [(light.wavelengths, light.spectrum) for light in lights or self.lights]
+        pairs = [(light.wavelengths, light.spectrum) for light in lights]
         spectra = [spectrum for _, spectrum in pairs]
         same = list(map(id, spectra)) == list(map(id, self._spectra))
         if self._responses is None or not same:

@@ -17,6 +17,7 @@ from ...scene.elements import check_attributes, name_of
 from ...scene.meshes import has_texcoords, mesh_arrays
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
+from .lanes import uploaded
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
 from .shader_materials import Diffracting, ShaderMaterial, diffracts, read_materials
@@ -99,11 +100,11 @@ def _mesh_triangles(shape: Any) -> Triangles:
 
 
 def default_tangents(normals: Real) -> Real:
-    """Return Mitsuba's tangents without texture coordinates, (n, 3) (Duff et al. 2017)."""
-    x, y, z = normals.T
-    sign = np.where(z < 0.0, -1.0, 1.0)
-    a = -1.0 / (sign + z)
-    return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=1)
+    """Return Mitsuba's tangents without texture coordinates, (n, 3)."""
+    import mitsuba as mi
+
+    tangents, _ = mi.coordinate_system(mi.Vector3f(*uploaded(normals)))
+    return np.array(tangents, np.float64).T
 
 
 def _grid(rows: int, columns: int, point: Callable[[Real, Real], tuple[Real, ...]]) -> Triangles:

@@ -13,6 +13,7 @@ from ...arrays import Real
 from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Mix, Surface, describe
 from ...plugin.parameter_changes import children
+from .lanes import Lanes
 from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_picture
 from .modelled import Modelled, index_spectra
 from .packing import pack_conductor
@@ -124,21 +125,20 @@ def _principled(bsdf: Any) -> Packed:
 
 def _through(bsdf: Any) -> NDArray[np.float64]:
     """Return the transmittance of the face from Mitsuba's values of the diffuse part."""
-    import drjit as dr
     import mitsuba as mi
 
     cosines = np.maximum(np.linspace(0.0, 1.0, _COSINES), 1e-3)
     context = mi.BSDFContext()
     context.type_mask = mi.BSDFFlags.Diffuse
-    si = dr.zeros(mi.SurfaceInteraction3f, _COSINES)
-    if mi.is_spectral:
-        si.wavelengths = mi.Spectrum(550.0)
+    lanes = Lanes(_COSINES, np.full(4, 550.0))
+    si = lanes.interaction()
     si.uv = mi.Point2f(0.5, 0.5)
     sines = np.sqrt(1.0 - cosines**2)
     si.wi = mi.Vector3f(mi.Float(sines), 0.0, mi.Float(cosines))
-    value = np.array(bsdf.eval(context, si, mi.Vector3f(0.0, 0.0, 1.0)), np.float64)[0]
-    base = np.array(children(bsdf)["diffuse_reflectance"].eval(si), np.float64)
-    base = np.broadcast_to(base.reshape(base.shape[0], -1), (base.shape[0], _COSINES))[0]
+    reflected = bsdf.eval(context, si, mi.Vector3f(0.0, 0.0, 1.0))
+    pigment = children(bsdf)["diffuse_reflectance"].eval(si)
+    value = lanes.spectra(mi.unpolarized_spectrum(reflected))[:, 0].astype(float)
+    base = lanes.spectra(pigment)[:, 0].astype(float)
     twice = np.divide(np.pi * value, base, out=np.zeros(_COSINES), where=base > 0.0)
     return np.asarray(twice / np.sqrt(max(float(twice[-1]), 1e-12)))
 
@@ -293,13 +293,11 @@ def diffracts(bsdf: Any) -> bool:
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:
     """Return the reflectance of a diffuse BSDF; other kinds become their diffuse part, or grey."""
-    textures = children(bsdf)
-    if bsdf.class_name() == "SmoothDiffuse":
-        return colour_map(textures["reflectance"], light)
-    kind = bsdf.class_name()
+    textures, kind = children(bsdf), bsdf.class_name()
     for key in ("diffuse_reflectance", "base_color", "reflectance"):
         if key in textures:
-            omissions.append(f"the gloss of {name} ({kind})")
+            if kind != "SmoothDiffuse":
+                omissions.append(f"the gloss of {name} ({kind})")
             return colour_map(textures[key], light)
     omissions.append(f"the material of {name} ({kind}, shown as grey)")
     return Map(np.full(3, _OTHER_GREY))

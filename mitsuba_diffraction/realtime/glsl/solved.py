@@ -10,10 +10,9 @@ from scipy.special import ndtr
 from ...arrays import Real
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
-from ...optics.orders import least_c
 from ...orders import OrderTable
 from ...orders.daylight import ENDS, daylight_weights
-from ...orders.rows import kept, leaving_transmittance
+from ...orders.rows import leaving_transmittance
 from ...plugin.description import Surface
 from ...shading import orders
 from .lobes import AZIMUTHS, RINGS, pack_lobes
@@ -67,21 +66,9 @@ def pack_orders(
     most_bytes : size of the efficiencies at most.
     """
     packed = orders.pack_orders(table, most_bytes)
-    low, high = table.wavelengths
     efficiencies = Packed(
         (Texture("efficiencies", packed.pixels, smooth=True),),
-        {
-            "sigma": sigma,
-            "order_cells": tuple(map(float, packed.counts)),
-            "order_columns": packed.columns,
-            "last_band": float(table.last_band),
-            "period": table.period,
-            "superstrate": table.superstrate,
-            "kept": kept(table),
-            "least_c": least_c(table.superstrate),
-            "solved_range": (1e-3 * low, 1e-3 * high),
-            "solved_reach": tuple(1e-3 * end for end in table.reach),
-        },
+        {"sigma": sigma, **orders.texture_constants(table, packed)},
         {"ORDERS": "", **({} if table.superstrate == 1.0 else {"FACE": ""})},
     )
     if method != "fast":

@@ -20,6 +20,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from ...analysis.maps.hemisphere import polar
 from ...arrays import Real
 from ...errors import DiffractionError
 from ...scene.elements import name_of
@@ -104,7 +105,7 @@ class Environment:
             rows, columns = np.clip(shape[:2], _SKY, _LARGEST).tolist()
         theta = np.pi * (np.arange(rows)[:, None] + 0.5) / rows
         phi = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
-        directions = _directions(theta, phi)
+        directions = polar(*np.broadcast_arrays(theta, phi))
         sun, radiance = np.zeros(3), np.zeros(3)
         if "sun_direction" in parameters:
             sun = np.array(parameters["sun_direction"], float).ravel()
@@ -201,12 +202,6 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
     )
     disks = sum(shape.class_name() == "Disk" for shape in shapes)
     return Packed((), uniforms, {"FLATS": str(len(shapes)), "DISKS": str(disks)})
-
-
-def _directions(theta: Any, phi: Any) -> Real:
-    """Return unit vectors (..., 3) from angles from the z axis and around it."""
-    x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
-    return np.stack(np.broadcast_arrays(x, y, np.cos(theta)), axis=-1)
 
 
 def beside(sun: Real, directions: Real) -> Real:

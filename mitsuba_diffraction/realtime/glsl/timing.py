@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any
+import functools
+from collections.abc import Sequence
 
 import numpy as np
 
-from .context import VertexBuffer, compile_program, set_uniforms
+from ...analysis.timing import rounds_of
+from .context import Bindings, VertexBuffer
 from .renderer import Renderer
-from .source import LIGHTS, fragment_parts
-from .texels import Uniform
+from .source import LIGHTS
+from .texels import Packed
 
 #: Width and height of the timed pictures.
 SIDE = 256
@@ -25,72 +26,46 @@ def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, floa
     """Return the seconds per fragment of each method.
 
     The fragments belong to a plane with the first diffracting surface's material, which fills the
-    picture under one directional light: all of the fragment stage, with next to no geometry.
-    Methods alternate in rounds, and the fastest time of each counts, so that background load
-    affects all equally. The clock is `Renderer.clock`.
-    """
-    timed = {method: _triangle(renderer, method) for method in methods}
-    seconds = dict.fromkeys(methods, np.inf)
-    for _ in range(_ROUNDS):
-        for method, (array, bind, _) in timed.items():
-            fragment = _seconds(renderer, array, bind) / SIDE**2
-            seconds[method] = min(seconds[method], fragment)
-    for _, _, resources in timed.values():
-        for resource in resources:
-            resource.release()
-    return seconds
-
-
-def _seconds(renderer: Renderer, array: Any, bind: Callable[[], object]) -> float:
-    """Return the seconds of one picture; a small picture before it compiles the program."""
-    target = renderer.target(SIDE, SIDE)
-    target.frame.use()
-    renderer.context.enable_only(renderer.context.NOTHING)  # no depth test
-    bind()
-    target.frame.viewport = (0, 0, 8, 8)
-    array.render()
-    renderer.context.finish()
-    target.frame.viewport = (0, 0, SIDE, SIDE)
-    clock = renderer.clock
-    times = 1
-    while True:
-        start = clock()
-        for _ in range(times):
-            array.render()
-        renderer.context.finish()
-        seconds = clock() - start
-        if seconds >= _SHORTEST:
-            target.release()
-            return seconds / times
-        times = max(2 * times, int(1.2 * times * _SHORTEST / max(seconds, 1e-6)))
-
-
-def _triangle(renderer: Renderer, method: str) -> tuple[Any, Callable[[], object], tuple[Any, ...]]:
-    """Return the vertex array of a triangle that covers the picture with a method's fragments.
-
-    The other results are a function that binds its uniforms, and resources to release.
+    picture under one directional light: all of the fragment stage, with next to no geometry. The
+    fastest of some rounds through all methods counts. The clock is `Renderer.clock`.
     """
     surfaces = renderer.scene.surfaces
     number = next(n for n, s in enumerate(surfaces) if s.material.diffraction is not None)
-    surface, tables = renderer.bindings[number], renderer.tables(method)[number]
-    parts = fragment_parts(method, surface.definitions | tables.definitions)
-    program = compile_program(renderer.context, f"method {method}", parts)
+    # a triangle that covers the picture
     corners = np.array([[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]])
     vertices = np.zeros((3, 17), np.float32)
     vertices[:, :2] = corners
     vertices[:, 3:9] = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
     vertices[:, 9:11] = 0.5 * (corners + 1.0)
     vertices[:, 11:] = [0.1, 0.1, 0.1, 1.0, 0.0, 1.0]
-    buffer = VertexBuffer(renderer.context, vertices)
-    uniforms: dict[str, Uniform] = {
+    buffer, target = VertexBuffer(renderer.context, vertices), renderer.target(SIDE, SIDE)
+    light = Bindings(renderer.context, Packed((), {
         "view_projection": tuple(np.eye(4).ravel().tolist()), "eye": _EYE,
         "light_place": np.array([_LIGHT] * LIGHTS, np.float32),
         "light_colour": np.ones((LIGHTS, 3), np.float32),
-    }  # fmt: skip
+    }))  # fmt: skip
 
-    def bind() -> None:
-        set_uniforms(program, uniforms)
-        renderer.use_responses(program, tables.use(program, surface.use(program)))
+    def seconds(method: str) -> float:
+        """Return the seconds of one picture."""
+        parts = light, renderer.bindings[number], renderer.tables(method)[number]
+        program = renderer.program(method, parts)
+        array = buffer.array(program)
+        target.frame.use()
+        renderer.context.enable_only(renderer.context.NOTHING)  # no depth test
+        renderer.bind(program, parts, renderer.lights)
+        clock, times = renderer.clock, 1
+        while True:
+            start = clock()
+            for _ in range(times):
+                array.render()
+            renderer.context.finish()
+            if (spent := clock() - start) >= _SHORTEST:
+                array.release()
+                return spent / times
+            times = max(2 * times, int(1.2 * times * _SHORTEST / max(spent, 1e-6)))
 
-    array = buffer.array(program)
-    return array, bind, (array, program, buffer)
+    calls = {method: functools.partial(seconds, method) for method in methods}
+    rounds = rounds_of(calls, _ROUNDS, lambda done, total: None)
+    buffer.release()
+    target.release()
+    return {method: min(times) / SIDE**2 for method, times in rounds.items()}

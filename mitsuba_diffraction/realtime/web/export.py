@@ -331,6 +331,7 @@ def _shaders(view: str) -> dict[str, Any]:
         "mains": {n: shader_file(f"{n}.frag") for n in ("surface", "picked", "map")},
         "vertex": web_source("surface.vert"),
         "shadow": web_source("position.frag"),
+        "add": web_source("add.frag"),
         "shown": {"vertex": web_source("whole.vert"), "fragment": display},
     }
 

@@ -3,12 +3,12 @@
 // The tangent frame is interpolated, not the directions to light and eye: interpolated directions
 // would be off by the square of the frame's rotation within a triangle, as much as a colour speckle.
 
-in vec3 position;
-in vec3 normal;
-in vec3 tangent;   // dp/du
-in vec2 texcoord;
-in vec3 colour;    // diffuse reflectance, linear sRGB
-in vec3 axis;      // (cos, sin) from the tangent to the patch's x axis, and its stretch
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec3 tangent;  // dp/du
+layout(location = 3) in vec2 texcoord;
+layout(location = 4) in vec3 colour;  // diffuse reflectance, linear sRGB
+layout(location = 5) in vec3 axis;  // (cos, sin) from the tangent to the patch's x axis, and its stretch
 
 uniform mat4 view_projection;
 

@@ -1,18 +1,5 @@
 // WebGL programs, textures and framebuffers, and drawing with them.
 
-const ADD = `#version 300 es
-precision highp float;
-precision highp sampler2D;
-uniform sampler2D sums;
-uniform sampler2D sample_;
-uniform bool first;
-uniform float covers; // 0: looked-up surroundings add no coverage
-out vec4 fragment;
-void main() {
-  ivec2 at = ivec2(gl_FragCoord.xy);
-  fragment = vec4(1.0, 1.0, 1.0, covers) * texelFetch(sample_, at, 0) + (first ? vec4(0.0) : texelFetch(sums, at, 0));
-}`;
-
 // Program that the driver compiles beside the page's scripts, which only `finish` waits for.
 class Program {
   constructor(gl, vertex, fragment) {
@@ -25,7 +12,6 @@ class Program {
       gl.attachShader(this.program, shader);
       return shader;
     });
-    Object.keys(ATTRIBUTES).forEach((name, n) => gl.bindAttribLocation(this.program, n, name));
     gl.linkProgram(this.program);
   }
 
@@ -177,7 +163,7 @@ class Drawing {
     this.sources = JSON.parse(await data.text(header.programs));
     this.compiled(method, lit, material);
     const whole = header.shown.vertex;
-    this.add = new Program(gl, whole, ADD);
+    this.add = new Program(gl, whole, header.add);
     this.shown = new Program(gl, whole, header.shown.fragment);
     this.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
     this.surfaces = await Promise.all(header.surfaces.map(async (surface) => ({
@@ -329,7 +315,7 @@ class Drawing {
     this.add.use();
     this.add.set({ first, covers: view.lookup ? 0 : 1 });
     this.add.texture("sums", this.sums[1].texture);
-    this.add.texture("sample_", this.sample.texture);
+    this.add.texture("frame", this.sample.texture);
     this.full(this.sums[0].frame, view.width, view.height);
   }
 

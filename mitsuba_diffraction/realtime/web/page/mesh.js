@@ -1,7 +1,5 @@
 // Decode a surface's triangles, which sections.py encodes, and upload them.
 
-const ATTRIBUTES = { position: 3, normal: 3, tangent: 3, texcoord: 2, colour: 3, axis: 3 };
-
 // Triangles of a surface. Each level of detail is uploaded when it is drawn first: 0 is all, larger
 // numbers are fewer. Before `load` one triangle stands for all, in the same formats.
 class Mesh {
@@ -26,13 +24,13 @@ class Mesh {
     const { gl, corners, columns, tangents } = this, { width, layout } = this.described;
     const array = gl.createVertexArray(), { length } = chosen ?? corners;
     gl.bindVertexArray(array);
-    Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
-      const place = layout[name];
-      if (place && place.value) {
-        this.constants[location] = [...place.value, 0, 0].slice(0, 4);
+    // in the order of surface.vert
+    Object.values(layout).forEach(({ value, low, step, column }, location) => {
+      if (value) {
+        this.constants[location] = [...value, 0, 0].slice(0, 4);
         return;
       }
-      const { low, step, column } = place, values = new Float32Array(length * size);
+      const size = low.length, values = new Float32Array(length * size);
       const whole = column === undefined; // triangles have one each
       const rows = whole ? tangents : columns;
       for (let i = 0, to = 0; i < length; ++i) {
