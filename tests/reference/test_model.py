@@ -83,6 +83,9 @@ def test_the_first_entry_of_the_mueller_matrix_is_the_brdf(model, coat):
 
 def test_below_the_surface_there_is_no_light_in_any_model():
     below = np.array([0.6, 0.0, -0.8])
+    for coherence in reference.COHERENCES:
+        for pair in ((polar(30), below), (below, polar(30)), (below, below)):
+            assert reference.brdf(FIELD, *pair, 520.0, coherence=coherence) == 0.0
     for name in reference.MODELS:
         assert reference.brdf(FIELD, polar(30), below, 520.0, model=name, **KERATIN) == 0.0
         assert np.all(reference.mueller(FIELD, below, polar(3), 520.0, model=name, **KERATIN) == 0)
