@@ -1,15 +1,10 @@
-"""What the package says of itself: ARCHITECTURE.md, tables of contents, docstrings.
-
-Every file and name there exists, and docstrings say what they describe: none of public code begins
-with a pronoun or a preposition.
-"""
+"""What the package says of itself: files and names in ARCHITECTURE.md and in contents exist."""
 
 from __future__ import annotations
 
 import ast
 import re
 from collections import Counter
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -114,28 +109,3 @@ def test_every_name_is_a_module_or_exported(name):
 def test_most_folders_have_one():
     folders = {file.parent for file in PACKAGE.rglob("__init__.py")}
     assert len(INITS) >= len(folders) - 1  # gratings says it in sentences
-
-
-# A docstring that begins with one of these words has no subject of its own.
-VAGUE = {"What", "Of", "Those", "That", "As", "By", "Its", "It", "One", "Such"}
-
-
-def first_lines(node: ast.AST) -> Iterator[str]:
-    """Yield the first line of each docstring of a syntax tree's public code."""
-    documented = ast.Module | ast.ClassDef | ast.FunctionDef
-    if isinstance(node, documented) and (text := ast.get_docstring(node)):
-        yield text.splitlines()[0]
-    for child in ast.iter_child_nodes(node):
-        name = getattr(child, "name", None) or ""
-        if not name.startswith("_") or name.endswith("__"):
-            yield from first_lines(child)
-
-
-def test_no_docstring_of_public_code_begins_vaguely():
-    lines = [
-        line
-        for file in PACKAGE.rglob("*.py")
-        for line in first_lines(ast.parse(file.read_text("utf-8")))
-    ]
-    assert len(lines) > 1000
-    assert [line for line in lines if re.match(r"\w*", line)[0] in VAGUE] == []

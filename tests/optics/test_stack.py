@@ -68,14 +68,3 @@ def test_a_gap_of_the_medium_above_is_the_limit_of_its_index(between):
         assert np.isfinite(exact).all()
         # the root of 2e-9 at the horizon
         np.testing.assert_allclose(exact[:, 1:], near[:, 1:], atol=1e-4)
-
-
-@pytest.mark.parametrize("pairs", [0, 1, 4])
-def test_quarter_waves_reflect_as_published(pairs):
-    """Zinc sulphide and cryolite on glass: Born and Wolf, section 1.6.5, eq. 95."""
-    high, low, glass, lam = 2.3, 1.35, 1.52, 546.0
-    layers = [high] + [low, high] * pairs
-    indices = np.array([glass, *layers])[:, None]
-    r_s, _ = amplitudes(np.ones(1), np.array([lam]), indices, lam / (4 * np.array(layers)))
-    x = high * (high / glass) * (high / low) ** (2 * pairs)
-    assert abs(r_s[0, 0]) ** 2 == pytest.approx(((1 - x) / (1 + x)) ** 2, abs=1e-12)

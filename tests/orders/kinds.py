@@ -105,12 +105,12 @@ def indices(table: OrderTable, directions: Array) -> Array:
     return np.where(directions[:, 2] > 0.0, 1.0, table.block or 1.0)[:, None]
 
 
-def near_orders(table: OrderTable, n: int, seed: int = 5) -> tuple[Array, Array, Array, Array]:
+def near_orders(table: OrderTable, n: int) -> tuple[Array, Array, Array, Array]:
     """Directions in lobes of orders of the first of four wavelengths, and random numbers.
 
     On both sides of sheets and blocks; of surfaces that are turned by TURN.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(5)
     low, high = table.wavelengths
     wavelength = as_single(rng.uniform(max(low, 400.0), min(high, 700.0), (n, 4)))
     wi, wo = np.empty((2, n, 3))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import drjit as dr
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.parameter_changes import Bounded, ObjectValues, take_changes
+from mitsuba_diffraction.plugin.parameter_changes import take_changes
 from tests.support import layered
 from tests.support.directions import Array
 from tests.support.gentle import load, pairs
@@ -68,64 +67,6 @@ def test_a_new_value_needs_no_new_kernel(variant):
                 assert all(kernel["cache_hit"] for kernel in history)
 
 
-class Surface:
-    """Two parameters whose sum must be below 3, and a derived quantity that may fail."""
-
-    def __init__(self) -> None:
-        self.number = Bounded("number", 1.0, 0.0, 2.0, lambda value: f"number={value:g}")
-        self.spectrum = mi.load_dict({"type": "uniform", "value": 1.0})
-        self.parameters = [self.number, ObjectValues("spectrum", self.spectrum, (0.5, 5.0))]
-        self.error: BaseException | None = None
-        self.derived = 0.0
-        self.derive()
-
-    def values(self) -> tuple[float, float]:
-        return float(self.number.value[0]), float(mi.traverse(self.spectrum)["value"][0])
-
-    def refusals(self) -> Iterator[str | None]:
-        yield "the sum is too large" if sum(self.values()) >= 3.0 else None
-
-    def derive(self) -> None:
-        error, self.error = self.error, None
-        if error is not None:
-            raise error
-        self.derived = sum(self.values())
-
-    changed = derive
-
-    def assign(self, number: float, value: float) -> None:
-        mi.set_property(self.number.value, mi.Float(number))
-        mi.traverse(self.spectrum).update({"value": value})
-
-
-@pytest.mark.parametrize(
-    ("values", "error", "named"),
-    [
-        ((3.0, 1.5), None, "number=3"),
-        ((1.5, 0.1), None, "spectrum.value=0.1|spectrum=0.1"),
-        ((float("nan"), float("inf")), None, "number=nan; spectrum"),
-        ((1.6, 1.6), None, "the sum is too large"),
-        ((1.2, 1.2), AssertionError("derived"), "derived"),
-        ((1.2, 1.2), KeyboardInterrupt("interrupted"), "interrupted"),
-    ],
-)
-def test_whatever_fails_the_last_values_and_what_follows_from_them_are_restored(
-    mono: None, values: tuple[float, float], error: BaseException | None, named: str
-) -> None:
-    surface, bystander = Surface(), Surface()
-    together: list[Any] = [surface, bystander]
-    surface.assign(1.25, 1.5)
-    take_changes(surface, together)
-    assert (surface.values(), surface.derived) == ((1.25, 1.5), 2.75)
-    surface.assign(*values)
-    bystander.assign(0.5, 0.75)
-    surface.error = error
-    with pytest.raises(type(error) if error else md.DiffractionError, match=named):
-        take_changes(surface, together)
-    assert (surface.values(), surface.derived) == ((1.25, 1.5), 2.75)
-    assert (bystander.values(), bystander.derived) == ((1.0, 1.0), 2.0)
-
-
 #: An index near 0 was rounded to 0 for the ratio of albedos.
 HOSTILE = [float("nan"), float("inf"), -1.0, 0.0, 1e-30, 0.02, 0.5, 3.0, 1e30]
 QUICK = "pigment"
@@ -146,6 +87,38 @@ def state(parameters: Any) -> dict[str, Array]:
         if dr.is_array_v(value)
         for numbers in [np.array(dr.detach(value), float)]
     }
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "named"),
+    [
+        ({"height_scale": np.nan, "eta": np.inf}, None, "height_scale=nan.*; eta=inf"),
+        ({"height_scale": 0.8}, AssertionError("derived"), "derived"),
+        ({"height_scale": 0.8}, KeyboardInterrupt("interrupted"), "interrupted"),
+    ],
+)
+def test_whatever_fails_all_surfaces_and_what_follows_from_them_are_restored(
+    mono, monkeypatch, changes, error, named
+):
+    surface, bystander = together = [made(QUICK), made(QUICK)]
+    before = [state(mi.traverse(each)) for each in together], values(surface)
+
+    def fail() -> None:
+        monkeypatch.undo()
+        surface.changed()
+        raise error
+
+    if error is not None:
+        monkeypatch.setattr(surface, "changed", fail)
+    for changed, numbers in ((surface, changes), (bystander, {"height_scale": 0.7})):
+        parameters = mi.traverse(changed)
+        for name, number in numbers.items():
+            parameters[name] = number
+    with pytest.raises(type(error) if error else md.DiffractionError, match=named):
+        take_changes(surface, together)
+    np.testing.assert_equal(
+        ([state(mi.traverse(each)) for each in together], values(surface)), before
+    )
 
 
 @pytest.mark.parametrize(

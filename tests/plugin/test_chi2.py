@@ -12,8 +12,8 @@ from tests.support import gentle
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import polar, rough_patch
 from tests.support.furnace import sent_on
+from tests.support.layered import INDICES, SIDES
 from tests.support.patches import SMALL_SCAN
-from tests.support.transmitting import INDICES, SIDES
 from tests.support.variants import use
 
 DEFAULT = {"int_ior": 1.5, "energy_conserving": True}

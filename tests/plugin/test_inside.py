@@ -59,16 +59,6 @@ def test_a_blend_is_the_weighted_sum(variant):
     assert evaluated(blend, wi, wo, WAVELENGTHS) == pytest.approx(expected, rel=1e-5)
 
 
-def test_a_mask_lets_the_rest_through(variant):
-    wi, wo = pairs()
-    masked = load("mask", opacity=0.25, nested=diffraction())
-    expected = 0.25 * evaluated(mi.load_dict(diffraction()), wi, wo, WAVELENGTHS)
-    assert evaluated(masked, wi, wo, WAVELENGTHS) == pytest.approx(expected, rel=1e-5)
-    si = interaction(wi, WAVELENGTHS)
-    transmitted = np.array(masked.eval_null_transmission(si)).T
-    assert np.broadcast_to(transmitted, (300, 4)) == pytest.approx(0.75, rel=1e-6)
-
-
 @pytest.mark.parametrize("theta", [0.0, 20.0])
 @pytest.mark.parametrize("kind", ["normalmap", "bumpmap"])
 def test_on_a_tilted_frame_it_sees_tilted_directions(variant, kind, theta):

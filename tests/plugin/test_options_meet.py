@@ -19,9 +19,8 @@ from mitsuba_diffraction.optics.paths import ABOVE, Returned
 from tests.support.directions import Array, polar
 from tests.support.kinds import COATED, METAL, ON_SURFACE, lit
 from tests.support.lanes import interaction
-from tests.support.layered import PATCH, load
+from tests.support.layered import BELOW, INDICES, PATCH, SIDES, both, load
 from tests.support.stokes import REVERSAL, bases, matrices, rotation
-from tests.support.transmitting import BELOW, INDICES, SIDES, both
 from tests.support.variants import use
 
 

@@ -1,4 +1,4 @@
-"""The plugin in scenes, in dictionaries and in every variant, whenever it is imported."""
+"""The plugin in every variant, whenever it is imported."""
 
 from __future__ import annotations
 
@@ -11,45 +11,8 @@ import numpy as np
 import pytest
 
 from tests.support import ROOT
-from tests.support.gentle import PATCH, load, pairs
+from tests.support.gentle import load, pairs
 from tests.support.lanes import evaluated
-
-XML = """<scene version="3.0.0">
-  <integrator type="path"><integer name="max_depth" value="3"/></integrator>
-  <sensor type="perspective">
-    <transform name="to_world"><lookat origin="0,-3,3" target="0,0,0" up="0,0,1"/></transform>
-    <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film>
-  </sensor>
-  <emitter type="constant"/>
-  <shape type="rectangle">
-    <bsdf type="twosided">
-      <bsdf type="diffraction">
-        <string name="filename" value="patch.npy"/>
-        <string name="pixel_size" value="0.085, 0.08"/>
-        <string name="max_height" value="auto"/>
-        <float name="coherence_width" value="4.5"/>
-        <string name="coherence" value="ensemble"/>
-        <float name="tolerance" value="1e-3"/>
-        <float name="orientation" value="15"/>
-        <float name="int_ior" value="1.5"/>
-        <boolean name="energy_conserving" value="false"/>
-        <bsdf type="diffuse"><spectrum name="reflectance" value="0.2"/></bsdf>
-      </bsdf>
-    </bsdf>
-  </shape>
-</scene>
-"""
-
-
-def test_scenes_in_xml_render(variant, tmp_path, monkeypatch):
-    np.save(tmp_path / "patch.npy", PATCH.heights)
-    monkeypatch.chdir(tmp_path)
-    scene = mi.load_string(XML)
-    image = np.array(mi.render(scene, spp=16, seed=1))
-    assert np.all(np.isfinite(image))
-    # a sky of radiance 1 over 20 % pigment and a few per cent of reflection, in sRGB's luminance
-    luminance = image[3:5, 3:5, :3].mean()
-    assert 0.1 < luminance < 0.4
 
 
 def test_variants_may_be_switched_back_and_forth(some_variant):

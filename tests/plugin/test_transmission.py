@@ -17,8 +17,7 @@ from tests.support.coarse import energy_as
 from tests.support.directions import polar, rough_patch
 from tests.support.furnace import furnace_in, sent_on
 from tests.support.lanes import interaction, spectra, vectors
-from tests.support.layered import PATCH, pairs
-from tests.support.transmitting import BELOW, SIDES, both
+from tests.support.layered import BELOW, PATCH, SIDES, both, pairs
 
 pytestmark = pytest.mark.usefixtures("some_variant")
 

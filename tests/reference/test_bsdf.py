@@ -1,4 +1,4 @@
-"""The reference: against sums over pixels, closed forms of gratings, and what any mirror does."""
+"""The reference: against sums over pixels and closed forms of gratings, and what it refuses."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ import pytest
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of, wavenumber
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
 from mitsuba_diffraction.reference import Sigmas, screen_power
 from tests.support.directions import polar, riemann_power, rough_patch, uniform_directions
 
-FLAT = HeightField(np.zeros((32, 32)), 0.08)
 #: Odd and even numbers of pixels, not square, nor are the pixels; 1.95 × 1.8 µm.
 SMALL = rough_patch((12, 15), (0.13, 0.15), 0.3)
 #: Well below 1/2 of the patch, so that several lobes overlap; σ in µm.
@@ -156,44 +155,7 @@ def test_peaks_obey_the_grating_equation():
         assert abs(peak - expected) < 1.5e-3
 
 
-# ------------------------------------------------------------------------ mirrors and symmetries
-
-
-def mirror_albedo(theta: float, lam: float = 550.0, width: float = 65.0) -> float:
-    """∫ f cosθo dωo = ∫ f du dv of a flat mirror, by the rectangle rule over its lobe."""
-    wi = polar(theta, 20.0)
-    step = 0.25 / (float(wavenumber(lam)) * sigma_of(width))  # 1/4 of 1/(kσ): exact for Gaussians
-    u, v = np.meshgrid(*2 * [step * np.arange(-24, 25)])
-    tangential = np.stack([u.ravel(), v.ravel()], axis=1) - wi[:2]
-    z2 = 1 - np.sum(tangential**2, axis=1)
-    wo = np.concatenate([tangential[z2 > 0], np.sqrt(z2[z2 > 0])[:, None]], axis=1)
-    return float(reference.brdf(FLAT, wi, wo, lam, coherence_width=width).sum() * step**2)
-
-
-@pytest.mark.parametrize(
-    ("theta", "allowed"), [(0.0, 1e-3), (30.0, 1e-3), (45.0, 1e-3), (60.0, 1e-3), (75.0, 3e-3)]
-)
-def test_a_flat_mirror_s_albedo_is_one(theta, allowed):
-    # what the window's own width changes, design section 7
-    assert mirror_albedo(theta) == pytest.approx(1.0, abs=allowed)
-
-
-@pytest.mark.parametrize("coherence", reference.COHERENCES)
-def test_swapping_directions_changes_nothing(coherence):
-    rng = np.random.default_rng(5)
-    wi, wo = uniform_directions(20, rng), uniform_directions(20, rng)
-    lam = rng.uniform(380, 780, 20)
-    there = reference.brdf(SMALL, wi, wo, lam, coherence_width=2.0, coherence=coherence)
-    back = reference.brdf(SMALL, wo, wi, lam, coherence_width=2.0, coherence=coherence)
-    # only wi + wo enters, but for the order of multiplication: a few units in the last place
-    assert there == pytest.approx(back, rel=1e-15)
-
-
-@pytest.mark.parametrize("coherence", reference.COHERENCES)
-def test_nothing_is_reflected_below_the_surface(coherence):
-    up, down = polar(30, 10), polar(120, 10)
-    values = reference.brdf(SMALL, [up, down, down], [down, up, down], 500.0, coherence=coherence)
-    assert np.array_equal(values, np.zeros(3))
+# ------------------------------------------------------------------------ arguments and limits
 
 
 def test_arguments_broadcast():

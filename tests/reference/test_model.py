@@ -7,8 +7,7 @@ import pytest
 
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.optics import blend
-from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
+from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.reference import boundary, model
 from tests.support.directions import polar, rough_patch
 from tests.support.matrices import pairs
@@ -33,15 +32,6 @@ def test_fields_at_a_bare_interface_make_the_matrix_of_equation_8(index):
     expected = [[-dot / (s * s0), inside0 * cross / (s * p0)], [inside * cross / (p * s0), pp]]
     found = np.moveaxis(model.small_slope(WI, WO, index), 0, -1)
     assert found == pytest.approx((epsilon - 1.0) * np.array(expected))
-
-
-def test_the_share_of_small_slope_follows_the_heights():
-    index = INDICES[2]
-    total = wavenumber(LIGHT.wavelength)[:, None] * (WI + WO)
-    roughness = blend.ScaleRoughness.from_heights(FIELD.heights, FIELD.pixel_size)
-    variance = roughness.at(np.hypot(*total[:, :2].T))
-    s = model.share(FIELD, LIGHT, index)
-    assert s == pytest.approx(model.small_slope_weight(total[:, 2], variance, index))
 
 
 def test_the_reference_s_default_is_the_model():
@@ -83,6 +73,9 @@ def test_the_first_entry_of_the_mueller_matrix_is_the_brdf(model, coat):
 
 def test_below_the_surface_there_is_no_light_in_any_model():
     below = np.array([0.6, 0.0, -0.8])
+    for coherence in reference.COHERENCES:
+        for pair in ((polar(30), below), (below, polar(30)), (below, below)):
+            assert reference.brdf(FIELD, *pair, 520.0, coherence=coherence) == 0.0
     for name in reference.MODELS:
         assert reference.brdf(FIELD, polar(30), below, 520.0, model=name, **KERATIN) == 0.0
         assert np.all(reference.mueller(FIELD, below, polar(3), 520.0, model=name, **KERATIN) == 0)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mitsuba_diffraction.reference import boundary, coat, model
-from tests.support.directions import uniform_directions
-
-Array = NDArray[np.float64]
+from tests.support.directions import Array, uniform_directions
 
 #: Index of the coat over the medium above.
 COAT = 1.3

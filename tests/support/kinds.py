@@ -14,9 +14,8 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from tests.support.directions import Array, as_single, turned
 from tests.support.lanes import with_bitmaps
-from tests.support.layered import PATCH, WIDTH, load, pairs
+from tests.support.layered import BELOW, INDICES, PATCH, SIDES, WIDTH, both, load, pairs
 from tests.support.stokes import matrices, reference_matrices
-from tests.support.transmitting import BELOW, INDICES, SIDES, both
 from tests.support.variants import evaluate
 
 METAL = {"eta": 0.9, "k": 6.0}

@@ -13,7 +13,8 @@ from mitsuba_diffraction.optics.boundary import Model
 from mitsuba_diffraction.osl.formulas import patch_formulas
 from mitsuba_diffraction.realtime.glsl.formulas import formulas
 from tests.support.blender import PLANE, result_of
-from tests.support.formulas import COAT, Array, Pairs
+from tests.support.directions import Array
+from tests.support.formulas import COAT, Pairs
 
 VERTEX = """#version 330
 const float PI = 3.14159265358979;

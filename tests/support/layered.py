@@ -29,8 +29,16 @@ def pairs(n: int = 200) -> tuple[Array, Array, Array]:
 
 
 FLAT = md.HeightField(np.zeros((40, 40)), 0.08)
+#: Interfaces and sheets that let light through.
+INDICES = {"int_ior": 1.5, "ext_ior": 1.0}
+SIDES: dict[str, dict[str, Any]] = {"dielectric": {}, "sheet": {"thin": True}}
+BELOW = np.array([1, 1, -1])
 
 
 def load(field: md.HeightField = PATCH, **parameters: Any) -> Any:
     raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
     return mi.load_dict(md.bsdf_dict(field, **(raw | parameters)))
+
+
+def both(field: md.HeightField = PATCH, **parameters: Any) -> Any:
+    return load(field, plugin="diffraction_dielectric", **INDICES, **parameters)

@@ -84,14 +84,13 @@ def shallow_grating(
     strength: float = 0.0,
     counts: Counts = Counts(20, 12, 4),  # noqa: B008 - immutable
     superstrate: float = 1.0,
-    period: float = 0.6,
-    wavelengths: tuple[float, float] = (500.0, 600.0),
 ) -> OrderTable:
     """A polarised table of the first-order small-slope model: a mirror with weak orders ±1.
 
     index : over that of the superstrate.
     strength : amplitude of orders ±1, over the root of both cosines and the boundary's matrix.
     """
+    period, wavelengths = 0.6, (500.0, 600.0)
     optical = superstrate * period
 
     def matrices(k: int, kind: int) -> np.ndarray:

@@ -8,13 +8,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import mitsuba_diffraction as md
+from tests.support.directions import Array
 from tests.support.lanes import with_bitmaps
 from tests.support.plates import camera
-
-Array = NDArray[np.float64]
 
 GRATING = md.gratings.sinusoidal(1.6, 0.2, periods=3, pixels_per_period=20)
 PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}}

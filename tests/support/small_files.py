@@ -154,10 +154,10 @@ def _(path: Path) -> None:
 
 
 # --- meshes --------------------------------------------------------------------------------------
-def _ply(vertices: int, faces: str, body: bytes, count: int, form: str = "binary_little_endian"):
+def _ply(vertices: int, faces: str, body: bytes, count: int) -> bytes:
     header = (
-        f"ply\nformat {form} 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\n"
-        f"property float z\nelement face {count}\n{faces}end_header\n"
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\nproperty float x\n"
+        f"property float y\nproperty float z\nelement face {count}\n{faces}end_header\n"
     )
     return header.encode() + body
 
@@ -196,9 +196,9 @@ shaped("index_ply.xml", "ply", lambda: _ply(3, _LIST, _XYZ + _to(400_000_000), 1
 shaped("negative_ply.xml", "ply", lambda: _ply(3, _LIST, _XYZ + _to(-1), 1))
 
 
-def serialized(index: int, vertices: int = 3, faces: int = 1, cut: int | None = None) -> bytes:
+def serialized(index: int, vertices: int = 3) -> bytes:
     """A mesh of Mitsuba's own format (version 4), single precision."""
-    content = struct.pack("<I", 0x1000) + b"mesh\0" + struct.pack("<QQ", vertices, faces)
+    content = struct.pack("<I", 0x1000) + b"mesh\0" + struct.pack("<QQ", vertices, 1)
     content += _XYZ + struct.pack("<3I", 0, 1, index)
     packed = struct.pack("<HH", 0x041C, 4) + zlib.compress(content)
     return packed + struct.pack("<QI", 0, 1)

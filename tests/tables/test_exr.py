@@ -13,10 +13,9 @@ import OpenEXR
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
-from mitsuba_diffraction.files import TABLE_ATTRIBUTE
 from mitsuba_diffraction.tables.exr import write_channels
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
-from tests.support.table_files import KINDS, PATCH, Contents, small_table
+from tests.support.table_files import KINDS, Contents, small_table
 
 #: Bytes: ten times what any takes, and a thousandth of what the damaged ones claim.
 MUCH = 1e6
@@ -67,25 +66,6 @@ def test_a_table_comes_back_bit_by_bit(table, tmp_path):
     assert loaded.digest() == table.digest()
     assert np.array_equal(table.expansion.functions, loaded.expansion.functions)
     assert json.dumps(loaded.summary()) == json.dumps(table.summary())
-
-
-def test_saving_what_was_loaded_makes_the_same_file(table, tmp_path):
-    table.save(tmp_path / "first.exr")
-    DiffractionTable.load(tmp_path / "first.exr").save(tmp_path / "second.exr")
-    first, second = ((tmp_path / f"{n}.exr").read_bytes() for n in ("first", "second"))
-    assert first == second
-
-
-def test_other_programs_find_named_float_channels_and_what_they_mean(saved):
-    with OpenEXR.File(str(saved), separate_channels=True) as file:
-        channels, document = set(file.channels()), json.loads(file.header()[TABLE_ATTRIBUTE])
-    expansion = document["expansion"]
-    assert channels == {
-        f"power.{i}.{t}" for i in range(expansion["intervals"]) for t in range(expansion["terms"])
-    }
-    assert document["version"] == FORMAT_VERSION
-    assert document["coherence_width"] == 1.8
-    assert document["source"]["digest"] == PATCH.digest()
 
 
 # ------------------------------------------------------------------------ what is no table

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField
-from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.tables.sampling import BANDED, BANDS, density_of, proposals
 from tests.support.directions import rough_patch
 
@@ -54,15 +53,6 @@ def test_their_cells_hold_the_power_of_the_orders():
     # cells are the mean over a band of κ, here one κ at the centre of cells a lobe wide
     correlation = np.corrcoef(cells[inside & beside], power[inside & beside])[0, 1]
     assert correlation > 0.9
-
-
-def test_a_grating_s_cells_lie_along_its_axis():
-    field = gratings.sinusoidal(2.0, 0.1, periods=4, rows=64, axis="y")
-    found = proposals(DiffractionTable.build(field, coherence_width=4.0))
-    cells = np.diff(found.rows[2])[:, None] * np.diff(found.columns[2], axis=1)
-    x = found.origin[0] + found.cell[0] * (np.arange(cells.shape[1]) + 0.5)
-    spread = np.sqrt(np.sum(cells * x**2))
-    assert spread < 1.5  # lobes of 1/(√2σ) = 0.7 rad/µm, in cells 1.5 wide
 
 
 def test_a_mirror_has_none():

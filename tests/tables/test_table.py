@@ -12,7 +12,7 @@ from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from mitsuba_diffraction.tables.build.checks import warnings_of
 from mitsuba_diffraction.tables.powers import as_powers, order_0_power, powers_at
 from tests.support.directions import lit_pairs, polar, rough_patch
-from tests.support.patches import DEFAULTS, PATCH, WIDTH, relative_error
+from tests.support.patches import DEFAULTS, PATCH, WIDTH
 
 
 def test_a_table_does_not_guess_outside_its_range():
@@ -23,17 +23,8 @@ def test_a_table_does_not_guess_outside_its_range():
     # towards grazing the spatial frequency is what runs out: 2k of the shortest wavelength
     assert np.isnan(table.brdf(polar(89.9), polar(89.9), 440.0))
     assert np.isfinite(table.brdf(polar(89.9), polar(89.9), 450.0))
-    assert table.brdf(polar(0), polar(120), 100.0) == 0.0  # below the surface there is nothing
-
-
-def test_tables_are_symmetric_and_one_sided():
-    table = DiffractionTable.build(PATCH, **DEFAULTS)
-    wi, wo, lam, _ = lit_pairs(PATCH, table.sigma, 100, seed=4)
-    # wi + wo is all that enters: rounding in the factor only
-    assert table.brdf(wi, wo, lam) == pytest.approx(table.brdf(wo, wi, lam), rel=1e-14)
-    below = wo * [1, 1, -1]
-    assert np.array_equal(table.brdf(wi, below, lam), np.zeros(100))
-    assert np.array_equal(table.brdf(below, wi, lam), np.zeros(100))
+    for pair in ((polar(0), polar(120)), (polar(120), polar(0))):
+        assert table.brdf(*pair, 100.0) == 0.0  # below the surface there is nothing
 
 
 def test_no_value_is_negative_though_series_ripple():
@@ -50,12 +41,6 @@ def test_light_fades_as_kappa_squared_towards_a_flat_surface():
     shallow = table.window_sum(q, 0.0, [1e-4, 1e-3, 1e-2])
     # the first interval's factor κ̂² is exact, what is left changes by κh = 1e-3
     assert shallow[1:] / shallow[:-1] == pytest.approx(100.0, rel=1e-2)
-
-
-def test_height_scale_is_a_factor_on_the_heights():
-    table = DiffractionTable.build(PATCH, tolerance=1e-4, height_scale_max=2.0, **DEFAULTS)
-    for scale in (0.3, 1.0, 2.0):
-        assert max(relative_error(table, PATCH, n=200, height_scale=scale)) <= 1e-4
 
 
 def test_a_table_remembers_its_source_and_has_no_warnings_in_it():

@@ -24,7 +24,6 @@ from tests.support import ROOT
 pytestmark = pytest.mark.thorough
 
 PROFILE, RANGE = sinusoidal(0.5, 0.05), (520.0, 640.0)
-SETTINGS = Settings(RANGE, tolerance=0.1)
 
 
 def test_a_solution_is_the_same_in_this_process_and_another():

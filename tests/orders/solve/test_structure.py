@@ -31,8 +31,6 @@ SLICES = (
 #: Protected aluminium with a high and a low index; µm.
 LAYERS = [("1.46", 0.08), ("2.3+0.01i", 0.06), ("1.38", 0.12)]
 SUPERSTRATE = 1.2
-#: Films over layers beneath, on another substrate.
-BURIED = {"layers": LAYERS, "beneath": MIRROR, "substrate": "Al"}
 
 
 def grating(profile, material="1.46", superstrate=1.0, **media):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables.build.derivatives import HeightDerivatives, missing
+from mitsuba_diffraction.tables.build.derivatives import HeightDerivatives
 from tests.support.directions import Array, rough_patch
 
 #: Even and odd numbers of pixels; so coarse that bins end at the Nyquist frequency of x.
@@ -64,11 +64,3 @@ def test_a_constant_changes_nothing():
     bins, order_0 = linear.forward(np.ones(patch.shape))
     assert np.abs(bins).max() < 1e-9
     assert np.abs(order_0).max() < 1e-9
-
-
-def test_what_tables_lack_is_named():
-    patch = PATCHES["fine"]
-    scan = md.HeightField(patch.heights, patch.pixel_size, cut_out=True)
-    other = md.DiffractionTable.build(scan, coherence_width=1.0, basis="svd")
-    assert missing(other) == ["basis=chebyshev", "periodic=exact"]
-    assert missing(table_of(patch, patch.heights)) == []

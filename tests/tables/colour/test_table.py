@@ -27,9 +27,9 @@ def integral(table: DiffractionTable, u: Array, v: Array, z: Array) -> Array:
     return np.asarray((power / (lam * 1e-3) ** 2) @ weights)
 
 
-def directions(n: int, seed: int = 0) -> tuple[Array, Array, Array]:
+def directions(n: int) -> tuple[Array, Array, Array]:
     """u, v and w of light from anywhere to anywhere, half of it near the mirror direction."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     radius = np.where(np.arange(n) % 2, np.exp(rng.uniform(-6, 0, n)), rng.uniform(0, 1.8, n))
     angle = rng.uniform(0.0, 2 * np.pi, n)
     w = rng.uniform(0.1, 0.98, n) * np.sqrt(4.0 - radius**2)

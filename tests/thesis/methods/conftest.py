@@ -8,7 +8,9 @@ from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
 from tests.support.directions import rough_patch
-from tests.support.thesis import WIDTH
+
+#: Coherence width, µm: narrower than the rough patch.
+WIDTH = 12.0
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,9 @@ from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain
 from mitsuba_diffraction.thesis.methods.method import trapezoid_rule
 from tests.support.directions import lit_pairs, polar, uniform_directions
-from tests.support.thesis import WIDTH
+
+#: Coherence width, µm: narrower than the rough patch.
+WIDTH = 12.0
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,9 @@ from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain, OrdersOnly, estimate_periods
 from mitsuba_diffraction.thesis.methods.periodic import copies
 from tests.support.directions import lit_pairs, polar, rough_patch
-from tests.support.thesis import WIDTH
+
+#: Coherence width, µm: narrower than the rough patch.
+WIDTH = 12.0
 
 
 @settings(max_examples=20)
