@@ -54,7 +54,7 @@ def test_other_heights_are_as_if_loaded(some_variant, kind):
 def test_changed_heights_leave_no_files(some_variant, tmp_path, monkeypatch):
     """Each step of an optimisation would leave a table in the cache that nobody asks for again."""
     monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
-    bsdf = load()
+    bsdf = load(tolerance=3e-3)  # a table that no other test may have left in memory
     loaded = sorted(tmp_path.rglob("*"))
     set_heights(bsdf, OTHER.heights)
     assert loaded
