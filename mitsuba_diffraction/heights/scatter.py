@@ -123,9 +123,16 @@ def rayleigh_rice_scatter(
     wavelength : nm.
     longest : as of `power_spectrum`.
 
-    Raises a DiffractionError as `power_spectrum` does.
+    Raises a DiffractionError as `power_spectrum` does, and if no wave of the band scatters light.
     """
     lam = 1e-3 * wavelength
+    if longest is not None and longest <= lam:
+        raise DiffractionError(
+            f"{field.name}: the scatter of {wavelength:g} nm is unknown: waves in the heights "
+            f"longer than {lam:.3g} µm scatter it, and this scan tells waves up to {longest:.3g} "
+            f"µm from form; take a scan more than {lam / longest:.2g} times as wide, or a shorter "
+            "wavelength"
+        )
     if (scatter := (4.0 * np.pi * float(field.heights.std()) / lam) ** 2) > _MOST_SCATTER:
         warn(
             f"{field.name}: (4πσ/λ)² is {scatter:.2g} at {wavelength:g} nm, and Rayleigh-Rice "

@@ -116,3 +116,11 @@ def test_scatter_without_an_abg_model_is_told(run, here, heights, why):
     row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
     assert row["a"] is None
     assert (row["tis_table"] > 0.0) is (row["tis_rayleigh_rice"] > 0.0) is bool(heights.any())
+
+
+def test_a_scan_too_small_to_tell_scatter_from_form_is_refused(run, here):
+    np.save("scan.npy", rough_patch((12, 12), (0.1, 0.1), 0.003).heights)
+    ran = run("scatter", "scan.npy", "--pixel-size", "0.1")
+    assert ran.code == 1
+    assert "more than 1.1 times as wide, or a shorter wavelength" in ran.err
+    run("scatter", "scan.npy", "--pixel-size", "0.1", "--wavelength", "500").succeeded()
