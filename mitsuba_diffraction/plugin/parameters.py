@@ -392,8 +392,19 @@ def coherence_of(props: Properties) -> str:
 def window_positions(props: Properties, table: DiffractionTable) -> WindowPositions | None:
     """Positions of windows on the patch, from UV coordinates with a scale."""
     tiling = choice(props, "tiling", TILINGS)
+    scales: dict[str, tuple[float, ...]] = {}
     # Checked in any case: one scene may be rendered with every coherence
-    scales = {name: props.get(name) for name in PLACING[:2] if name in props}
+    for name, most in ((PLACING[0], 2), (PLACING[1], 1)):
+        if name not in props:
+            continue
+        numbers = numbers_of(props.get(name)) or ()
+        if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
+            expected = "one number" if most == 1 else "one number or two, 'u, v',"
+            raise DiffractionError(
+                f"{name}={props.get(name)!r} must be {expected} of µm, above 0 and at most "
+                f"{MOST_UV_SCALE:g}"
+            )
+        scales[name] = tuple(numbers)
     if coherence_of(props) != SURFACE:
         return None
     if len(scales) != 1:
@@ -401,13 +412,7 @@ def window_positions(props: Properties, table: DiffractionTable) -> WindowPositi
             f"coherence='{SURFACE}' takes one of uv_scale, µm a unit of UV coordinates, and "
             f"world_scale, µm a unit of length of the scene; got {' and '.join(scales) or 'none'}"
         )
-    ((name, value),) = scales.items()
-    numbers, most = numbers_of(value) or (), 1 if name == "world_scale" else 2
-    if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
-        expected = "one number" if most == 1 else "one number or two, 'u, v',"
-        raise DiffractionError(
-            f"{name}={value!r} must be {expected} of µm, above 0 and at most {MOST_UV_SCALE:g}"
-        )
+    ((name, numbers),) = scales.items()
     return WindowPositions((numbers[0], numbers[-1]), name == "world_scale", tiling, table)
 
 

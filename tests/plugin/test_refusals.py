@@ -118,6 +118,7 @@ REFUSED = [
     ({"coherence": "surface"}, "takes one of uv_scale,"),
     (PLACED | {"world_scale": 1.0}, "got uv_scale and world_scale"),
     (PLACED | {"uv_scale": -1.0}, "uv_scale=-1.0 must be one number or two"),
+    ({"world_scale": "10, 20"}, "world_scale='10, 20' must be one number"),
     (PLACED | {"uv_scale": "1, 2, 3"}, "must be one number or two"),
     (PLACED | {"uv_scale": 1e9}, "at most 1e+07"),
     ({"coherence": "surface", "world_scale": "10, 20"}, "must be one number of µm"),
