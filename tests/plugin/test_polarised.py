@@ -26,6 +26,32 @@ def polarised() -> None:
     use("llvm_ad_spectral_polarized", "scalar_spectral_polarized")
 
 
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [
+        ({"int_ior": 1.5, "ext_ior": 1.0}, {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0}),
+        ({"material": "Al"}, {"type": "conductor", "material": "Al"}),
+        ({"material": "Au"}, {"type": "conductor", "material": "Au"}),
+    ],
+)
+@pytest.mark.parametrize("mode", ["Radiance", "Importance"])
+def test_a_flat_patch_s_specular_light_is_mitsuba_s(polarised, ours, theirs, mode):
+    flat = md.HeightField(np.zeros((40, 40)), 0.08)
+    smooth, wide = mi.load_dict(theirs), {"coherence_width": 65.0}  # a lobe far from the horizon
+    bsdf, mirror = load(flat, **ours, **wide), load(flat, material="none", **wide)
+    for theta, phi in ((0.0, 0.0), (30.0, 10.0), (56.0, 100.0), (75.0, 200.0)):
+        wi = as_single(polar(theta, phi))[None]
+        wo = wi * [-1, -1, 1]
+        found, flat_one = (matrices(b, wi, wo, LAM, mode) for b in (bsdf, mirror))
+        found = found / flat_one[..., :1, :1]
+        context = mi.BSDFContext(getattr(mi.TransportMode, mode))
+        context.component = 0
+        si = interaction(wi, LAM[None])
+        weight = np.array(smooth.sample(context, si, 0.5, mi.Point2f(0.5))[1], float)
+        weight = np.moveaxis(weight.reshape(4, 4, 4), 2, 0)
+        assert found[0] == pytest.approx(weight, abs=1e-4)
+
+
 @pytest.mark.parametrize("mode", ["Radiance", "Importance"])
 @pytest.mark.parametrize("theta", [30.0, 56.0, 75.0, 150.0, 120.0])
 def test_through_a_flat_dielectric_specular_light_is_mitsuba_s(polarised, mode, theta):
