@@ -13,7 +13,7 @@ through    light that goes through a dielectric, or a thin sheet
 paths      paths of light by a boundary: sides, widths w, matrices, order 0
 orders     a grating's orders: cells of efficiencies, lobes
 mirror     order 0 as a mirror's lobe, and its correction at the horizon
-lobes      means over Gaussian lobes that the horizon cuts
+lobes      nodes across Gaussian lobes that the horizon cuts
 colour     spectra to XYZ and sRGB; differences of colours
 materials  names and numbers of materials; published indices of tissues
 display    linear sRGB to the values of a screen, by a view

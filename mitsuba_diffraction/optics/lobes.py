@@ -1,57 +1,45 @@
-"""Means over Gaussian lobes that the horizon cuts (NumPy, float64)."""
+"""Nodes across Gaussian lobes that the horizon cuts (NumPy, float64)."""
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
-from typing import NamedTuple
-
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from ..arrays import Real
 
 #: A lobe exp(−|Δ|²/width²) ends here, in units of its width: exp(−3.5²) = 5e-6.
 LOBE_END = 3.5
-#: Nodes in cosθo across a lobe.
-LOBE_NODES = 96
+# Gauss and Legendre's nodes across a lobe that the horizon cuts, and its end there: means of 1/cosθ
+# are within 2 %.
+_NODES, _END = 5, 2.5
 
 
-class LobeMeans(NamedTuple):
-    """Share of lobes that is above the horizon, and means of cosθo and of 1/cosθo over it."""
+def nodes_across(
+    width: float, radius: Real, least: float
+) -> tuple[NDArray[np.integer], Real, Real]:
+    """Return nodes (m,) of lobes (n,): the lobe, cosθo, and the share of the lobe; lobe by lobe.
 
-    visible: Real
-    cosine: Real
-    pole: Real
+    A lobe that the horizon cuts has several, since light changes across it as 1/cosθo. Any other
+    lobe has one, its middle.
 
-
-def lobe_means(width: float, radius: Real) -> LobeMeans:
-    """Return means over lobes of a width with centres at a distance from the normal.
-
-    width, radius : in direction cosines.
+    width : of the lobes; radius : of their middles from the normal, in direction cosines.
+    least : smallest cosθo.
     """
-    cosine = np.sqrt(np.maximum(1.0 - radius**2, 1e-12))
-    places, at_horizon = _lobes(width)
-    means = LobeMeans(np.ones_like(radius), cosine, 1.0 / cosine)
-    below = radius > places[0]
-    place = (radius[below] - places[0]) * ((len(places) - 1) / (places[-1] - places[0]))
-    lower = np.minimum(place.astype(np.int32), len(places) - 2)
-    share = np.minimum(place - lower, 1.0)
-    for mean, cut in zip(means, at_horizon, strict=True):
-        mean[below] = cut[lower] + (cut[lower + 1] - cut[lower]) * share
-    return means
-
-
-@lru_cache(maxsize=64)
-def _lobes(width: float) -> tuple[Real, LobeMeans]:
-    """Tabulate the means against the distance, from where part of a lobe is below the horizon."""
-    edge = max(1.0 - 2.0 * LOBE_END * width, 0.0)
-    deepest = math.sqrt(1.0 - max(edge - LOBE_END * width, 0.0) ** 2)
-    cosines = (np.arange(LOBE_NODES) + 0.5) * (deepest / LOBE_NODES)
-    sines = np.sqrt(1.0 - cosines**2)
-    places = np.linspace(edge, 1.0 + LOBE_END * width, 96)
-    lobes = np.exp(-(((sines - places[:, None]) / width) ** 2))
-    lobes *= deepest / LOBE_NODES / (math.sqrt(math.pi) * width) * cosines / sines
-    visible = np.minimum(lobes.sum(axis=1), 1.0)
-    safe = np.maximum(visible, 1e-30)
-    visible[-1] = 0.0
-    return places, LobeMeans(visible, lobes @ cosines / safe, lobes @ (1.0 / cosines) / safe)
+    cut = radius > 1.0 - _END * width
+    counts = np.where(cut, _NODES, 1)
+    several = np.repeat(cut, counts)
+    cosine, share = np.empty(len(several)), np.ones(len(several))
+    cosine[~several] = np.sqrt(1.0 - radius[~cut] ** 2)
+    middle = radius[cut, None]
+    low, high = (np.clip(middle + side * _END * width, 0.0, 1.0) for side in (-1, 1))
+    last, first = np.sqrt(1.0 - low**2), np.sqrt(1.0 - high**2)
+    place, weights = np.polynomial.legendre.leggauss(_NODES)
+    cos_o = np.maximum(first + (last - first) * 0.5 * (1.0 + place), least)
+    sin_o = np.sqrt(1.0 - cos_o**2)
+    # d(sinθo) = cosθo/sinθo d(cosθo)
+    lobe = weights * np.exp(-(((sin_o - middle) / width) ** 2)) * cos_o / sin_o
+    visible = 0.5 * scipy.special.erfc((middle - 1.0) / width)
+    cosine[several] = cos_o.ravel()
+    share[several] = (lobe * (visible / lobe.sum(axis=1, keepdims=True))).ravel()
+    return np.repeat(np.arange(len(radius)), counts), cosine, share

@@ -72,6 +72,18 @@ def test_combinations_send_on_no_more_than_they_get(mono, field, parameters):
     check_combination(field, parameters)
 
 
+def test_orders_that_graze_along_steps_bring_no_light(mono):
+    """The horizon cuts a lobe whose light rises as 1/cosθ: 1.18 came from 88.5°."""
+    steps = 0.29 * (np.arange(13) % 8 < 4) + np.zeros((22, 1))
+    field = md.HeightField(steps, (0.113, 0.0905))
+    surface = mi.load_dict(md.bsdf_dict(
+        field, material="none", model="kirchhoff", coherence_width=9.5, wavelength=600.0
+    ))  # fmt: skip
+    directions = np.array([polar(theta, -78.0) for theta in (87.4, 88.5, 89.5)])
+    mean, error = furnace_in(surface, directions, 1, samples=40000)
+    assert np.all(mean <= 1.01 + 3.0 * error)
+
+
 def test_a_film_over_next_to_no_contrast_is_finite(mono, coarsely):
     film = {"int_ior": 1.01, "ext_ior": 1.0, "film_ior": 1.05, "film_thickness": 50.0}
     mean, _ = furnace_in(bsdf("rough", material=None, **film), np.array([polar(30.0, 0.0)]), 1)

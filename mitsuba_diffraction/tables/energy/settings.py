@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 61
+VERSION = 62
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ over the frequencies that are visible, with κ = k w times the height scale and 
 
 - order 0, the mirrored or refracted direction, by quadrature over its lobe, or over all directions
   where the lobe is wide;
-- the few *strong* orders, one by one, with means over the lobe tabulated against its place, since
-  an order that grazes the horizon (a Rayleigh anomaly) is a spike of the albedo;
+- the few *strong* orders, one by one, and at several nodes across a lobe that the horizon cuts: an
+  order that grazes the horizon (a Rayleigh anomaly) is a spike of the albedo;
 - the many *weak* ones as a smooth density, by quadrature over directions.
 """
 
@@ -25,7 +25,7 @@ import scipy
 
 from ...arrays import Real, Single
 from ...optics.geometry import LAST_ANGLE, wavenumber
-from ...optics.lobes import LOBE_END, LOBE_NODES, lobe_means
+from ...optics.lobes import LOBE_END, nodes_across
 from ...optics.paths import Path
 from ..directional import DirectionGrid, LinearMap, Quadrature, quadrature
 from ..order_mixture import NARROW, order_mixture
@@ -53,6 +53,7 @@ _NEAR_CRITICAL = np.radians([-1.5, -0.5, 0.0, 0.5, 1.5])
 _PAIRS = 1 << 16
 #: How often distances between azimuths of incidence are halved, at most.
 _MOST_HALVED = 2
+_NODES = 96  # in cosθo across order 0
 _FINER = 16  # nodes of order 0's power from one κ of the mixture to the next
 
 
@@ -256,11 +257,11 @@ class Transport:
         low = np.clip(sine - LOBE_END * width, *ends)
         high = np.clip(sine + LOBE_END * width, *ends)
         first, last = np.sqrt(1.0 - high**2), np.sqrt(1.0 - low**2)
-        place = (np.arange(LOBE_NODES) + 0.5) / LOBE_NODES
+        place = (np.arange(_NODES) + 0.5) / _NODES
         # denser towards both ends, where C may have a root's slope; where a lobe has no directions
         # on this side the step is 0, and so are the shares
         cos_o = np.maximum(first + (last - first) * place**2 * (3.0 - 2.0 * place), 1e-9)
-        step = (last - first) * 6.0 * place * (1.0 - place) / LOBE_NODES
+        step = (last - first) * 6.0 * place * (1.0 - place) / _NODES
         sin_o = np.sqrt(1.0 - cos_o**2)
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= scipy.special.i0e(2.0 * sin_o * sine / width**2)
@@ -387,22 +388,15 @@ class Transport:
         pairs = square < (1.0 + LOBE_END * self._width) ** 2
         row, column, order = np.nonzero(pairs)
         radius, azimuth = np.sqrt(square[pairs]), np.arctan2(y[pairs], x[pairs])
+        which, cos_o, visible = nodes_across(self._width, radius, LEAST_COSINE)
+        row, order, azimuth = row[which], order[which], azimuth[which]
         cosines = cosines.ravel()
-        cos_i = cosines[row]
-        visible, cos_o, pole = lobe_means(self._width, radius)
-        kappa = self._kappa(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
-        turn = azimuth - phi[column]
-        gain = self._gain(cosines, row, cos_o, turn)
-        # G cosθ is linear in cosθ across a lobe whose mean of 1/cosθ is `pole`
-        near = cos_o * pole > 1.001
-        at_horizon = LEAST_COSINE * self._gain(
-            cosines, row[near], np.asarray(LEAST_COSINE), turn[near]
-        )
-        rising = np.clip(at_horizon / np.maximum(gain[near] * cos_o[near], 1e-30), 0.0, 1.0)
-        gain[near] *= 1.0 + rising * (cos_o[near] * pole[near] - 1.0)
+        kappa = self._kappa(cosines[row], cos_o)
+        gain = self._gain(cosines, row, cos_o, azimuth - phi[column[which]])
         shares = (mixture.strong_at(kappa, order) * gain * visible).astype(np.float32)
         to_orders = grid.interpolation(np.arccos(cos_o), azimuth)
-        return to_orders.summed_in(np.count_nonzero(pairs, axis=-1), shares)
+        counts = np.bincount(row * len(phi) + column[which], minlength=len(theta) * len(phi))
+        return to_orders.summed_in(counts.reshape(len(theta), len(phi)), shares)
 
 
 def _blocks(count: int, width: int) -> list[slice]:
