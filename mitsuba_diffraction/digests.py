@@ -1,4 +1,4 @@
-"""Digests of files, and keys of what is made of several parts."""
+"""Digests of files, and keys of stored results, made of several parts."""
 
 from __future__ import annotations
 

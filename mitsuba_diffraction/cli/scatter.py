@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> Figures:
 
     field, settings = options.load_patch(args)
     if field.cut_out and options.level_of(args) is None:
-        field = field.treated(level="quadratic")  # the form of a mirror is no roughness
+        field = field.treated(level="quadratic")  # a mirror's form scatters no light
     asked = TableSettings(**settings | {"wavelength_range": ends})
     longest = longest_of(resolved(asked, [field]))
     spectrum = power_spectrum(field, longest)

@@ -37,7 +37,7 @@ class Report:
     # groups or calls that were given out again, since the scheduler or a worker's files were lost;
     # tasks of a worker that died are given to others by the scheduler
     retries: int = 0
-    lost: int = 0  # workers that were there and are not any more
+    lost: int = 0  # workers that have left
     seconds: float = 0.0  # wall time of the client
     busy: float = 0.0  # seconds of all workers' work
     bytes: int = 0  # size of the sums that came from workers
@@ -90,7 +90,7 @@ class UnderWay(Generic[Key]):
         return len(self._there)
 
     def lost(self) -> int:
-        """Count now, and return how many workers were there and are not any more."""
+        """Count the workers, and return the number of workers that have left."""
         self._counted, self._there = time.monotonic(), set(workers_of(self._client))
         self._seen |= self._there
         return len(self._seen - self._there)

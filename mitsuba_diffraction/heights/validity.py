@@ -155,9 +155,9 @@ def _facet(field: HeightField, level: HeightField) -> bool:
 def tilted(field: HeightField, shortest: float) -> bool:
     """Return whether the least-squares plane of a scan is a tilt that turns the mirror direction.
 
-    The plane of a facet is none: it rises by as much as a step inside, the facet's end. Few periods
-    of a grating are none: four of a sine of amplitude a tilt the plane by up to 0.48 a across the
-    patch, and with the weights of a Hann window by 0.08 a.
+    A facet's plane is no tilt: it rises by as much as the step at the facet's end. Nor is a plane
+    that waves tilt: four periods of a sine of amplitude a tilt the least-squares plane by up to
+    0.48 a across the patch, and the plane weighted by a Hann window by 0.08 a.
 
     shortest : shortest wavelength, µm.
     """

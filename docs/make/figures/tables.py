@@ -286,7 +286,7 @@ _OURS = ("fast", "exact")
 def realtime(documents: Documents) -> dict[str, str]:
     """Deviations of the shaders over all pixels of scenes, and the noise in them.
 
-    Times and textures are those of the first scene.
+    Times and textures are of the first scene.
     """
     header = ("scene", *(f"`{m}`" for m in _OURS), "noise of `exact`", "of the path tracer")
     rows, high = [], 0.0
@@ -299,7 +299,7 @@ def realtime(documents: Documents) -> dict[str, str]:
         ]
         high = max(high, *(e["direct"]["delta_e_percentiles"]["99"] for e in entries))
         link = f"[{Path(document['scene']).stem}]({document['scene']})"
-        # links of `compare` start at the repository's root, those of the page in docs
+        # links of `compare` start at the repository's root, links of the page in docs
         rows.append((link.replace("](scenes/", "](../scenes/"), *map(plain_number, values)))
     fast, exact = (documents[0][1]["methods"][method] for method in _OURS)
     sizes = [plain_number(entry["texture_bytes"] / 1e6) for entry in (fast, exact)]
@@ -359,7 +359,7 @@ def main(args: argparse.Namespace) -> None:
     part = PARTS[args.part]
 
     def checked(document: dict[str, Any]) -> dict[str, Any]:
-        part.tables([("", document)])  # what is missing is missed here
+        part.tables([("", document)])  # an incomplete document fails here
         return document
 
     files = [measured / part.document for measured in args.measured]
