@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, check_choice
 from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
-from .mesh_materials import FITTED, Part, own_bsdf
+from .mesh_materials import FITTED, OWN, PART, own_bsdf
 from .orbit import ORBIT
-from .orientation.mesh_files import read_mesh, write_ply
+from .orientation.mesh_files import load_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
 from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
 
@@ -27,7 +27,7 @@ from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
 CLAMP = "render:clamp"
 
 # Properties of such a shape that say how its file is read
-_OF_FILE = ("filename", "fit", "up", "frame", "others")
+_OF_FILE = ("filename", "fit", "up", "frame", "others", PART, OWN)
 
 
 class SceneValues(NamedTuple):
@@ -63,20 +63,18 @@ def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValu
     return SceneValues(parameters, materials, surface, clamp, float(values.get(ORBIT, 0.0)))
 
 
-def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
+def fit_meshes(state: Any, folder: Path) -> None:
     """Replace shapes of type `fitted_mesh` by PLY files of the fitted meshes.
 
     state : `mi.parser.ParserState`.
     folder : where the files are written.
-    parts : materials of shapes that are parts of their files, see `split_meshes`.
 
     Raises a DiffractionError if a file is not a mesh, or cannot be put on the stage.
     """
 
     @cache
-    def fitted(file: Path, fit: bool, up: str) -> tuple[TriangleMesh, Any]:
-        read = read_mesh(file)
-        return fitted_mesh(read, fit=fit, up=up), read.materials
+    def fitted(file: Path, fit: bool, up: str) -> TriangleMesh:
+        return fitted_mesh(load_mesh(file), file, fit=fit, up=up)
 
     for number, node in enumerate(state.nodes):
         if node.props.plugin_name() != FITTED:
@@ -87,18 +85,18 @@ def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
         file = Path(str(mi.file_resolver().resolve(props["filename"])))
         fit, written = str(props.get("fit", "true")).lower(), folder / f"{number}.ply"
         check_choice("fit", fit, ("true", "false"))
-        mesh, materials = fitted(file, fit == "true", props.get("up", "auto"))
+        mesh = fitted(file, fit == "true", props.get("up", "auto"))
         _frame(state, mesh.positions, props)
-        part, own = parts.get(number, ([], False))
         ply = copied(props, "ply", leave=_OF_FILE)
-        if part:
-            chosen = np.isin(materials, [material.number for material in part])
+        if PART in props:
+            assert mesh.materials is not None
+            chosen = np.isin(mesh.materials, np.fromstring(props[PART], int, sep=" "))
             if not chosen.any():
                 raise DiffractionError(f"mesh '{file}': its scene has no triangles of the material "
                                        f"'{props.id()}'; delete that material")  # fmt: skip
             mesh = mesh.part(chosen)
-        if own:
-            ply["bsdf"] = own_bsdf(file, part[0])
+        if OWN in props:
+            ply["bsdf"] = own_bsdf(file, props[OWN])
         write_ply(written, mesh)
         ply["filename"] = str(written)
         ply.set_id(props.id())

@@ -14,7 +14,6 @@ from ..errors import DiffractionError, counted
 from ..plugin.description import Surface, describe
 from ..plugin.parameter_changes import children
 from ..plugin.textures import is_attribute
-from .meshes import has_texcoords
 
 #: What `mesh_files.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
@@ -114,6 +113,12 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
         raise DiffractionError(
             f"{name_of(shape, number)} has no attribute {name}, which its BSDF reads; {remedy}"
         )
+
+
+def has_texcoords(mesh: Any) -> bool:
+    """Return whether the vertices of a `mi.Mesh` have texture coordinates."""
+    name = "has_vertex_texcoords"  # Mitsuba 3.10 calls it without "vertex"
+    return bool(np.all(getattr(mesh, name if hasattr(mesh, name) else "has_texcoords")()))
 
 
 def attribute_of(thing: Any) -> str:

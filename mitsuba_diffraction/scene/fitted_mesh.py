@@ -14,7 +14,6 @@ from ..arrays import Real
 from ..errors import DiffractionError, check_choice, counted
 from .orientation.directions import direction_field
 from .orientation.interchange import stated_up
-from .orientation.mesh_files import MeshFile
 from .orientation.tangents import check_tangents
 from .orientation.trimesh import TriangleMesh, oriented_mesh
 
@@ -112,7 +111,9 @@ def fit_of(mesh: TriangleMesh, file: Path, up: str = "auto") -> MeshPlacement:
     return MeshPlacement(up, rotation, scale, shift, scale * (high - low))
 
 
-def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> TriangleMesh:
+def fitted_mesh(
+    mesh: TriangleMesh, file: Path, *, fit: bool = True, up: str = "auto"
+) -> TriangleMesh:
     """Return a mesh put on the stage, whose patch has a direction.
 
     The direction is the file's `vertex_orientation`; else ∂p/∂u where texture coordinates suit a
@@ -120,7 +121,7 @@ def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> Triang
 
     Raises a DiffractionError if the mesh does not fit.
     """
-    mesh, placed = read.mesh, fit_of(read.mesh, read.file, up)
+    placed = fit_of(mesh, file, up)
     if mesh.orientation is None and check_tangents(mesh).usable:
         mesh = replace(mesh, orientation=np.tile([1.0, 0.0], (len(mesh.positions), 1)))
     if fit:
@@ -129,7 +130,8 @@ def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> Triang
     if mesh.orientation is not None and mesh.uv is not None:
         return mesh
     field = direction_field(mesh.positions, mesh.normals, mesh.faces)
-    return oriented_mesh(mesh.positions, mesh.normals, mesh.faces, field.directions, mesh.uv)
+    made = oriented_mesh(mesh.positions, mesh.normals, mesh.faces, field.directions, mesh.uv)
+    return replace(made, materials=mesh.materials)
 
 
 def framing(positions: Real, camera: Real, tangents: tuple[float, float]) -> Real:

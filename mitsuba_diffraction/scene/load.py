@@ -19,8 +19,7 @@ from ..llvm import require_llvm
 from ..plugin import installed
 from ..system import memory
 from .bands import SensorBands, check_bands, put_bands, wider_tables
-from .elements import check_attributes, name_of, surfaces_within
-from .meshes import has_texcoords
+from .elements import check_attributes, has_texcoords, name_of, surfaces_within
 from .mitsuba_errors import error_of
 from .orbit import turn_cameras
 from .parameters import check_parameters, files_of, parameters_of
@@ -200,8 +199,8 @@ def _instantiated(
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)
-        of_meshes, parts = split_meshes(state, values.materials)
-        fit_meshes(state, Path(folder), parts)
+        of_meshes = split_meshes(state, values.materials)
+        fit_meshes(state, Path(folder))
         edits = put_materials(state, values.materials, of_meshes)
         edits += put_surface_parameters(state, values.surface)
         mi.parser.transform_all(config, state)

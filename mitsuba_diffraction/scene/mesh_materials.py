@@ -10,7 +10,7 @@ import mitsuba as mi
 
 from ..errors import check_choice, warn
 from ..files import GLTF, readable_file
-from ..gltf import GltfMaterial, materials_of
+from ..gltf import materials_of
 from ..plugin.pigment import base_colour
 from .surfaces import appended, copied, inner
 
@@ -18,11 +18,12 @@ from .surfaces import appended, copied, inner
 FITTED = "fitted_mesh"
 #: Values of `others`: materials that no surface is put on have the shape's surface, or their own.
 OTHERS = ("surface", "own")
-#: Materials of a shape's file that it has, and whether it has their own BSDF.
-Part = tuple[list[GltfMaterial], bool]
+#: Properties of a shape that is a part of its file: numbers of its materials, and of the material
+#: whose own BSDF it has.
+PART, OWN = "_part", "_own"
 
 
-def split_meshes(state: Any, wanted: Collection[str]) -> tuple[list[str], dict[int, Part]]:
+def split_meshes(state: Any, wanted: Collection[str]) -> list[str]:
     """Make shapes of the materials of glTF files that surfaces are put on.
 
     Ids of the scene go before names of materials.
@@ -30,11 +31,9 @@ def split_meshes(state: Any, wanted: Collection[str]) -> tuple[list[str], dict[i
     state : `mi.parser.ParserState`.
     wanted : ids that surfaces are put on.
 
-    Returns the names of all materials of these files, and the materials of each shape that is a
-    part of its file, by the number of its node.
+    Returns the names of all materials of these files.
     """
     known: list[str] = []
-    split: dict[int, Part] = {}
     for number in range(len(state.nodes)):
         props = state.nodes[number].props
         if props.plugin_name() != FITTED or "filename" not in props:
@@ -60,30 +59,34 @@ def split_meshes(state: Any, wanted: Collection[str]) -> tuple[list[str], dict[i
         numbers = {name: n for name, n in state.id_to_index.items() if n != number}
         for n, (name, shape) in enumerate(zip(parts, made, strict=True)):
             shape.set_id(name)
+            shape[PART] = " ".join(str(material.number) for material in parts[name])
+            if own[name]:
+                shape[OWN] = parts[name][0].number
             if n == 0:  # in place of the whole
                 state.nodes[number].props, at = shape, number
             else:
                 added = appended(state, mi.ObjectType.Shape, shape)
                 at = added.index()
                 state.nodes[0].props[f"part_{at}"] = added
-            numbers[name], split[at] = at, (parts[name], own[name])
+            numbers[name] = at
         state.id_to_index = numbers
-    return known, split
+    return known
 
 
-def own_bsdf(file: Path, material: GltfMaterial) -> Any:
+def own_bsdf(file: Path, number: int) -> Any:
     """Return the BSDF of a material of a glTF file: base colour, metallic and roughness.
 
     The textures of metallic and roughness (glTF 2.0, 3.9.2), and all else, are left out with a
     warning.
     """
+    material = next(each for each in materials_of(file) if each.number == number)
     if material.left_out:
         warn(
             f"material {material.name!r} of '{file}' is shown without its "
             f"{', '.join(material.left_out)}"
         )
     principled = {
-        "type": "principled", "base_color": base_colour(file, f"'{file}'", material.number),
+        "type": "principled", "base_color": base_colour(file, f"'{file}'", number),
         "metallic": material.metallic, "roughness": material.roughness,
     }  # fmt: skip
     return mi.load_dict({"type": "twosided", "bsdf": principled})

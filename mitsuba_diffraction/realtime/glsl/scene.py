@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...errors import DiffractionError
-from ...scene.elements import check_attributes, name_of
-from ...scene.meshes import has_texcoords, mesh_arrays
+from ...scene.elements import check_attributes, has_texcoords, name_of
+from ...scene.orientation.mesh_files import mesh_arrays
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lanes import uploaded

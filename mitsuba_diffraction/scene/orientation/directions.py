@@ -205,12 +205,6 @@ def direction_field(
     )
 
 
-def turned(directions: Real, normals: Real, degrees: float) -> Real:
-    """Directions (n, 3) turned around their normals, counter-clockwise seen from outside."""
-    angle = np.radians(degrees)
-    return np.cos(angle) * directions + np.sin(angle) * np.cross(normals, directions)
-
-
 def _smoothest(surface: WeldedMesh) -> Complex:
     """The lowest eigenvector of L z = λ M z on each connected part, by inverse iteration."""
     count, part = surface.parts()

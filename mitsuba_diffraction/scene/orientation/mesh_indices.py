@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Whole
 from ...errors import DiffractionError, counted, quoted
 from ...limits import check_content
 
@@ -90,21 +91,20 @@ class Header(NamedTuple):
                 raise DiffractionError(f"{shown}: its text is not all numbers") from error
 
 
-def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> None:
+def check_mesh(file: Path, kind: str, number: int = 0) -> None:
     """Refuse a mesh file that Mitsuba cannot read safely.
 
     kind : Mitsuba's plugin: `ply`, `serialized`, `obj`; others are not checked.
     number : of the mesh in a serialized file.
-    shown : the file in messages.
 
     Raises a DiffractionError if a triangle names a vertex that does not exist, the file is shorter
     than its header states, or it has no triangles: Dr.Jit compiles kernels for all meshes alive,
     and one without triangles would break every later rendering of the process.
     """
-    shown = shown or f"mesh '{file}'"
+    shown = f"mesh '{file}'"
     triangles = None
     if kind == "ply":
-        triangles = _check_ply(file, shown)
+        read_ply(file, shown)
     elif kind == "serialized":
         triangles = _check_serialized(file, number, shown)
     elif kind == "obj" and next(rests_of_lines(file, b"f"), None) is None:
@@ -165,35 +165,86 @@ def ply_header(file: Path, shown: str) -> Header | None:
     return Header(form, elements, end.end())
 
 
-def _check_ply(file: Path, shown: str) -> int | None:
-    """Return the number of triangles; None for what Mitsuba refuses, such as polygons."""
+def read_ply(file: Path, shown: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]] | None:
+    """Return numbers of a PLY file's vertices by name, and its triangles (m, 3); or None.
+
+    None stands for other files. Polygons are cut into fans, as Mitsuba cuts polygons of OBJ files.
+
+    Raises a DiffractionError if the file is damaged, or has no triangles.
+    """
     header = ply_header(file, shown)
-    if header is None:
+    if header is None or header.format not in FORMATS:
         return None
     elements = {element.name: element for element in header.elements}
-    vertices, face = (elements.get(name, Element(name, 0, [])) for name in ("vertex", "face"))
-    if not vertices.number or not face.number:
-        return 0
-    content = header.content(file, shown)
-    if sum(e.number * header.row(e, 0).itemsize for e in header.elements) > len(content):
+    vertex, face = (elements.get(name, Element(name, 0, [])) for name in ("vertex", "face"))
+    content, triangles = header.content(file, shown), np.empty((0, 3), np.int64)
+    try:
+        if vertex.number and face.number:
+            if sum(e.number * header.row(e, 0).itemsize for e in header.elements) > len(content):
+                raise ValueError
+            # lists have three numbers, as Mitsuba expects
+            sizes = [e.number * header.row(e, 3).itemsize for e in header.elements]
+            at = dict(zip(elements, np.cumsum([0, *sizes]).tolist(), strict=False))
+            triangles = _triangles(header, face, content, at["face"], vertex.number, shown)
+            rows = np.frombuffer(content, header.row(vertex, 3), vertex.number, at["vertex"])
+    except DiffractionError:
+        raise
+    except (ValueError, OverflowError, MemoryError) as error:
         raise DiffractionError(
-            f"{shown}: its {file.stat().st_size} bytes are fewer than its header states "
-            f"({vertices.number} vertices, {counted(face.number, 'face')}); export the mesh again"
-        )
-    before = header.elements[: header.elements.index(face)]
-    # lists have three numbers, as Mitsuba expects
-    start, row = sum(e.number * header.row(e, 3).itemsize for e in before), header.row(face, 3)
-    if start + face.number * row.itemsize > len(content):
-        return None  # no triangles alone, or too short
-    rows = np.frombuffer(content, row, face.number, start)
-    for n, words in enumerate(face.properties):
-        if words[0] != "list":
-            continue
-        if (rows[f"{n}"] != 3).any():
-            return None
-        if words[2] not in ("float", "float32", "double", "float64") or "vertex" in words[3]:
-            check_indices(rows[f"{n} values"], vertices.number, shown)
-    return face.number
+            f"{shown}: cannot be read: its {file.stat().st_size} bytes are not what its header "
+            f"states ({vertex.number} vertices, {counted(face.number, 'face')}); export it again"
+        ) from error
+    if not len(triangles):
+        raise DiffractionError(f"{shown}: it has no triangles")
+    return {words[-1]: rows[f"{n}"] for n, words in enumerate(vertex.properties)}, triangles
+
+
+def _triangles(
+    header: Header, face: Element, content: NDArray[np.uint8], at: int, vertices: int, shown: str
+) -> NDArray[Any]:
+    """Return the triangles (m, 3) of faces whose rows begin at a byte of the content.
+
+    Raises a DiffractionError if one names no vertex, a ValueError if the content is too short.
+    """
+    lists = {n: words for n, words in enumerate(face.properties) if words[0] == "list"}
+    named = [n for n, words in lists.items() if words[3] in ("vertex_indices", "vertex_index")]
+    row = header.row(face, 3)
+    if at + face.number * row.itemsize <= len(content):
+        rows = np.frombuffer(content, row, face.number, at)
+        if all((rows[f"{n}"] == 3).all() for n in lists):
+            for n, words in lists.items():
+                if n in named or not words[2].startswith(("float", "double")):
+                    check_indices(rows[f"{n} values"], vertices, shown)
+            return np.asarray(rows[f"{named[-1]} values"]) if named else np.empty((0, 3), np.int64)
+    counts, polygons = [], []
+    for _ in range(face.number):
+        for n, words in enumerate(face.properties):
+            size = 1
+            if n in lists:
+                kind = header.type_of(words[1])
+                size = int(np.frombuffer(content, kind, 1, at)[0])
+                at += kind.itemsize
+            kind = header.type_of(words[-2])
+            if size < 0:
+                raise ValueError
+            if n in named:
+                counts.append(size)
+                polygons.append(np.frombuffer(content, kind, size, at))
+            at += size * kind.itemsize
+    corners = np.concatenate(polygons)
+    check_indices(corners, vertices, shown)
+    return np.asarray(corners[fans(np.array(counts))])
+
+
+def fans(counts: Whole) -> Whole:
+    """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
+
+    counts : corners of each polygon.
+    """
+    triangles = np.maximum(counts - 2, 0)
+    first = np.repeat(np.cumsum(counts) - counts, triangles)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return np.stack([first, first + step + 1, first + step + 2], axis=-1).astype(np.int64)
 
 
 def check_indices(corners: NDArray[Any], vertices: int, shown: str) -> None:
