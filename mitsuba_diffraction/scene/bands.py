@@ -130,26 +130,20 @@ def _lacking(solved: bool, served: tuple[float, float], first: float, last: floa
 
     served : shortest and longest wavelength of the table, nm.
     """
-    low, high = served
-    begins_late = first < low - _MARGIN
-    if solved:
-        if not begins_late and last <= high + _MARGIN:
-            return ""
-        return (
-            f"is black outside {low:.4g} to {high:.4g} nm, the range of its table, and the camera "
-            f"records {first:.4g} to {last:.4g} nm; make the table with a wider range of "
-            "wavelengths"
-        )
-    ends_early = last > high + _MARGIN
-    faults = [f"is black below {low:.4g} nm, where its table begins"] if begins_late else []
-    if ends_early:
-        faults.append(f"has the values of {high:.4g} nm at all longer wavelengths")
+    (low, high), faults = served, []
+    if first < low - _MARGIN:
+        faults.append(f"is black below {low:.4g} nm, where its table begins")
+    if last > high + _MARGIN:
+        beyond = f"is black above {high:.4g} nm, where its table ends"
+        values = f"has the values of {high:.4g} nm at all longer wavelengths"
+        faults.append(beyond if solved else values)
     if not faults:
         return ""
-    wider = f"{first if begins_late else low:.4g}, {last if ends_early else high:.4g}"
+    wider = f"wavelength_range=({min(first, low):.4g}, {max(last, high):.4g})"
     return (
         f"{' and '.join(faults)}, and the camera records {first:.4g} to {last:.4g} nm; make the "
-        f"table with wavelength_range=({wider}) (the command 'precompute')"
+        f"table with {'a wider range of wavelengths' if solved else wider} "
+        f"(the command '{'solve' if solved else 'precompute'}')"
     )
 
 

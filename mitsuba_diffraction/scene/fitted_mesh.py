@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
 
 from ..arrays import Real
 from ..errors import DiffractionError, check_choice, counted
@@ -185,10 +186,7 @@ def _leaning(front: Real) -> Real:
     """Return the rotation (3, 3) after which a unit normal looks to the camera and upwards."""
     azimuth = math.atan2(-front[0], -front[1]) if np.hypot(*front[:2]) > _LINE else 0.0
     lean = math.radians(_LEANS) - math.asin(np.clip(front[2], -1.0, 1.0))
-    cos, sin = math.cos(azimuth), math.sin(azimuth)
-    around_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    cos, sin = math.cos(lean), math.sin(lean)
-    return np.array([[1.0, 0.0, 0.0], [0.0, cos, sin], [0.0, -sin, cos]]) @ around_z
+    return np.asarray(Rotation.from_euler("zx", [azimuth, -lean]).as_matrix())
 
 
 def _guessed_up(positions: Real, file: Path, flat: bool) -> str:

@@ -100,7 +100,7 @@ def test_order_1_of_each_dot_is_where_its_grating_sends_it() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"periods": {1: 0.01}}, "periods from 0.01 to 0.01 µm must be between 0.1 and 100"),
+        ({"periods": {1: 0.01}}, "periods=0.01 must be between 0.1 and 100"),
         ({"periods": {5: 1.0}}, "no dot has a grating"),
         ({"periods": {1: np.nan}}, "periods: nan must be a finite number"),
         ({"periods": (0.8, 1.2)}, "both be of labels"),

@@ -27,8 +27,6 @@ _NAMED = 4  # materials that a line lists
 # What PLY files call the attribute
 _TURN = ORIENTATION.removeprefix("vertex_")
 
-KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
-
 
 def load_mesh(path: str | os.PathLike[str]) -> TriangleMesh:
     """Read all that a mesh file holds; where it has no normals, `vertex_normals` makes smooth ones.
@@ -106,7 +104,7 @@ def _warn_of_materials(file: Path) -> None:
 
 
 def _load(file: Path, **options: bool) -> mi.Mesh:
-    kind, shown = KINDS[file.suffix.lower()], f"mesh '{file}'"
+    kind, shown = file.suffix[1:].lower(), f"mesh '{file}'"
     check_mesh(file, kind)
     try:
         return mi.load_dict({"type": kind, "filename": str(file), **options})

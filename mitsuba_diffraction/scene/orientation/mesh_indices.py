@@ -20,8 +20,8 @@ from ...arrays import Whole
 from ...errors import DiffractionError, counted, quoted
 from ...limits import check_content
 
-#: Formats of the content of a PLY file.
-FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
+# Formats of the content of a PLY file, and NumPy's codes of the order of their bytes
+_FORMATS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 # NumPy's codes of the types of a PLY file
 _CODES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
@@ -56,14 +56,10 @@ class Header(NamedTuple):
     elements: list[Element]
     size: int
 
-    @property
-    def order(self) -> str:
-        """NumPy's code of the order of bytes in the content."""
-        return ">" if self.format == "binary_big_endian" else "<"
-
     def type_of(self, word: str) -> np.dtype[Any]:
         """Return the type of the numbers in the content that the file calls by this word."""
-        return np.dtype("<f8" if self.format == "ascii" else self.order + _CODES[word])
+        code = "f8" if self.format == "ascii" else _CODES[word]
+        return np.dtype(_FORMATS[self.format] + code)
 
     def row(self, element: Element, length: int) -> np.dtype[Any]:
         """Return the type of a row of an element in the content, whose lists have this length."""
@@ -173,7 +169,7 @@ def read_ply(file: Path, shown: str) -> tuple[dict[str, NDArray[Any]], NDArray[A
     Raises a DiffractionError if the file is damaged, or has no triangles.
     """
     header = ply_header(file, shown)
-    if header is None or header.format not in FORMATS:
+    if header is None or header.format not in _FORMATS:
         return None
     elements = {element.name: element for element in header.elements}
     vertex, face = (elements.get(name, Element(name, 0, [])) for name in ("vertex", "face"))

@@ -140,24 +140,18 @@ class TangentReport:
                 f"{self.degenerate:.0%} of the surface has texture coordinates without area, hence "
                 "no tangent: unwrap those parts"
             )
+        remedy = "unwrap along the body in one piece"
+        if self.has_orientation:
+            remedy = "make it with the command 'tangents' along another guide"
         if self.breaks:
             lines.append(
-                f"the patch's direction {self.breaking()}: colours will show seams; "
-                + (
-                    "make it with the command 'tangents' along another guide"
-                    if self.has_orientation
-                    else "unwrap along the body in one piece"
-                )
+                f"the patch's direction {self.breaking()}: colours will show seams; {remedy}"
             )
         if self.turns_fast:
             lines.append(
                 f"the patch's direction turns by over {TURN:g} degrees between neighbours, or "
-                f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: "
-                + (
-                    "use a finer mesh, or the command 'tangents' along another guide"
-                    if self.has_orientation
-                    else "colours will show seams; unwrap along the body in one piece"
-                )
+                f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: colours will "
+                f"show seams; use a finer mesh, or {remedy}"
             )
         if self.mirrored > MOST_MIRRORED:
             lines.append(
@@ -168,16 +162,11 @@ class TangentReport:
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers and strings, for printing."""
+        direction = f"dp/du turned by {ORIENTATION}" if self.has_orientation else "dp/du"
         return {
             "triangles": self.triangles,
             "texture coordinates": self.has_uv,
-            "direction of the patch": (
-                "none"
-                if not self.has_uv
-                else f"dp/du turned by {ORIENTATION}"
-                if self.has_orientation
-                else "dp/du"
-            ),
+            "direction of the patch": direction if self.has_uv else "none",
             "shares of the surface area, 0 to 1": {
                 "without tangent": self.degenerate,
                 "mirrored": self.mirrored,
