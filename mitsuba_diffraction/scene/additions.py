@@ -1,66 +1,27 @@
-"""Values split, and meshes, lights and filters of a parsed scene changed before it is instantiated.
+"""Meshes, lights and filters of a parsed scene changed before it is instantiated.
 
 A shape of type `fitted_mesh` becomes a mesh on the stage (`fitted_mesh.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError, check_choice
-from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
 from .mesh_materials import FITTED, OWN, PART, own_bsdf
-from .orbit import ORBIT
 from .orientation.mesh_files import load_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
-from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
-
-#: Scene parameter that limits samples, in units of white.
-CLAMP = "render:clamp"
+from .surfaces import copied, inner, targets_of
 
 # Properties of such a shape that say how its file is read
 _OF_FILE = ("filename", "fit", "up", "frame", "others", PART, OWN)
-
-
-class SceneValues(NamedTuple):
-    """Values for a scene.
-
-    Attributes
-    ----------
-    parameters : of the scene's own parameters.
-    materials : surfaces by the id that they are put on.
-    surface : parameters of the BSDF, for all diffracting surfaces of the scene.
-    clamp : limit of samples in units of white, or None.
-    orbit : degrees by which the cameras are turned around the vertical.
-    """
-
-    parameters: dict[str, Any]
-    materials: dict[str, str]
-    surface: dict[str, Any]
-    clamp: float | None
-    orbit: float
-
-
-def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValues:
-    """Separate values of a scene's parameters from surfaces for its ids and their parameters.
-
-    known : names of the scene's parameters, which precede the BSDF's.
-    """
-    materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
-    own = (CLAMP, ORBIT)
-    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k not in own}
-    surface = {k: v for k, v in rest.items() if k not in known and k in NAMES[REFLECTING]}
-    clamp = float(values[CLAMP]) if CLAMP in values else None
-    parameters = {k: v for k, v in rest.items() if k not in surface}
-    return SceneValues(parameters, materials, surface, clamp, float(values.get(ORBIT, 0.0)))
 
 
 def fit_meshes(state: Any, folder: Path) -> None:
@@ -128,23 +89,16 @@ def remove_dark_lights(state: Any) -> None:
 
     state : `mi.parser.ParserState`, its references resolved.
     """
-
-    nodes = state.nodes
     black = {
         number
-        for number, node in enumerate(nodes)
+        for number, node in enumerate(state.nodes)
         if node.props.plugin_name() == "d65" and float(node.props.get("scale", 1.0)) == 0.0
     }
     if not black:  # reading a property hides from Mitsuba that no plugin reads it
         return
-    dark = {
-        number
-        for number, node in enumerate(nodes)
-        if node.type == mi.ObjectType.Emitter and black.intersection(targets_of(node).values())
-    }
-    for node in nodes:
-        for name, target in targets_of(node).items():
-            if target in dark:
+    for node in state.nodes:
+        for name, number in inner(state, node, mi.ObjectType.Emitter).items():
+            if black.intersection(targets_of(state.nodes[number]).values()):
                 del node.props[name]
 
 

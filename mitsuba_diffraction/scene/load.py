@@ -22,14 +22,13 @@ from .bands import SensorBands, check_bands, put_bands, wider_tables
 from .elements import check_attributes, has_texcoords, name_of, surfaces_within
 from .mitsuba_errors import error_of
 from .orbit import turn_cameras
-from .parameters import check_parameters, files_of, parameters_of
+from .parameters import SceneValues, files_of, scene_values
 
 if TYPE_CHECKING:
-    from .additions import SceneValues
     from .surfaces import Edit
 
-# mi.load_file's own arguments: a scene parameter of that name could not be passed.
-_TAKEN = ("path", "parallel", "optimize")
+# Arguments of Mitsuba's `parse_file`: a scene parameter of that name could not be passed.
+_TAKEN = ("config", "filename")
 # Least memory of a pixel: film, bitmap and one path of a wavefront.
 _BYTES_PER_PIXEL = 128
 # Dr.Jit's names of the backends that need a GPU
@@ -81,21 +80,17 @@ def load_scene(
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
-    from .additions import split_values
-
     readable_file(file)
-    defaults = parameters_of(file, parameters) or {}
-    values = split_values(parameters, defaults)
-    known = files_of(file, values.parameters, with_sources=False)
+    values = scene_values(file, parameters)
+    known = files_of(file, values.parameters)
     for each in known:
         note_input(each)
-    check_parameters(file, values.parameters)
     for name in _TAKEN:
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     serving = contextlib.nullcontext() if bands is None else wider_tables(bands.first)
     with serving, _read_by_mitsuba(file):
-        _check_parameters_act(file, values, defaults)
+        _check_parameters_act(file, values)
         scene, edits = _instantiated(file, known, values, box_filter, bands)
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
@@ -122,16 +117,12 @@ def check_values(file: Path, parameters: Mapping[str, Any]) -> None:
 
     Raises a DiffractionError with the parameter's place in the scene.
     """
-    from .additions import split_values
-
-    values = split_values(parameters, parameters_of(file, parameters) or {})
+    values = scene_values(file, parameters)
     with _read_by_mitsuba(file):
         mi.parser.parse_file(mi.parser.ParserConfig(mi.variant()), str(file), **values.parameters)
 
 
-def _check_parameters_act(
-    file: Path, values: SceneValues, defaults: Mapping[str, str | None]
-) -> None:
+def _check_parameters_act(file: Path, values: SceneValues) -> None:
     """Refuse values other than the defaults that only BSDFs read which surfaces on ids replace."""
     from .mesh_materials import split_meshes
     from .surfaces import effective, put_materials
@@ -150,7 +141,7 @@ def _check_parameters_act(
         return effective(parsed)
 
     for name, value in values.parameters.items() if values.materials else ():
-        if defaults.get(name) in (None, str(value)):
+        if values.defaults.get(name) in (None, str(value)):
             continue
         # a value may be the default in other words: 0.0 for 0, the whole path of a file
         before, after = (read("", covered) != read(name, covered) for covered in (False, True))

@@ -26,8 +26,6 @@ from ..plugin.presets import MATERIALS, find_preset
 from ..plugin.presets import PLUGIN as PRESET_PLUGIN
 from .elements import own_id, surfaces_within
 
-#: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
-MATERIAL = "material:"
 #: Beginning of a surface that is a preset: `preset:NAME[,parameter=value…]`.
 PRESET = "preset:"
 
