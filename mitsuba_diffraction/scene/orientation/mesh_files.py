@@ -77,10 +77,9 @@ def mesh_arrays(mesh: Any) -> MeshArrays:
 
 def _ply_arrays(file: Path) -> MeshArrays:
     """Return the arrays of a PLY file."""
-    read = read_ply(file, f"mesh '{file}'")
-    if read is None or not {"x", "y", "z"} <= {*read[0]}:
-        raise DiffractionError(f"mesh '{file}': cannot be read: it is no PLY; export it again")
-    columns, triangles = read
+    columns, triangles = read_ply(file, f"mesh '{file}'")
+    if not {"x", "y", "z"} <= {*columns}:
+        raise DiffractionError(f"mesh '{file}': its vertices have no x, y and z; export it again")
 
     def numbers(*names: str) -> Real | None:
         if not names or not {*names} <= {*columns}:

@@ -117,15 +117,19 @@ def rests_of_lines(file: Path, word: bytes) -> Iterator[str]:
                 yield line[len(word) :].strip().decode("utf-8", "replace")
 
 
-def ply_header(file: Path, shown: str) -> Header | None:
-    """Return the header of a PLY file; None for other files.
+def ply_header(file: Path, shown: str) -> Header:
+    """Return the header of a PLY file.
 
-    Raises a DiffractionError if it has no end, or an element has no properties or an unknown type.
+    Raises a DiffractionError for other files, and if the header has no end, or an element has no
+    properties or an unknown type.
     """
     with file.open("rb") as stream:
         start = stream.read(_LONGEST_HEADER)
     if not re.match(rb"ply\s", start):
-        return None
+        todo = f"run the command 'tangents {file} -o mesh.ply' first, and use mesh.ply"
+        if file.suffix.lower() not in (".obj", ".serialized"):
+            todo = "convert it to PLY or OBJ"
+        raise DiffractionError(f"{shown} is not a PLY, which is expected: {todo}")
     form, elements = "", []
     end = re.search(rb"\nend_header[ \t\r]*\n", start)
     if end is None:
@@ -158,19 +162,19 @@ def ply_header(file: Path, shown: str) -> Header | None:
             raise DiffractionError(
                 f"{shown}: element {quoted(element.name)} has no properties, {element.number} times"
             )
+    if form not in _FORMATS:
+        raise DiffractionError(f"{shown}: a PLY of format {quoted(form)} cannot be read")
     return Header(form, elements, end.end())
 
 
-def read_ply(file: Path, shown: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]] | None:
-    """Return numbers of a PLY file's vertices by name, and its triangles (m, 3); or None.
+def read_ply(file: Path, shown: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
+    """Return numbers of a PLY file's vertices by name, and its triangles (m, 3).
 
-    None stands for other files. Polygons are cut into fans, as Mitsuba cuts polygons of OBJ files.
+    Polygons are cut into fans, as Mitsuba cuts polygons of OBJ files.
 
-    Raises a DiffractionError if the file is damaged, or has no triangles.
+    Raises a DiffractionError if the file is no PLY, is damaged, or has no triangles.
     """
     header = ply_header(file, shown)
-    if header is None or header.format not in _FORMATS:
-        return None
     elements = {element.name: element for element in header.elements}
     vertex, face = (elements.get(name, Element(name, 0, [])) for name in ("vertex", "face"))
     content, triangles = header.content(file, shown), np.empty((0, 3), np.int64)
