@@ -193,27 +193,25 @@ def _of_dots(
     name: str, given: Values, values: NDArray[Any], full_scale: float
 ) -> NDArray[np.float64]:
     """Return a quantity at the dots (ny, nx), or NaN."""
+    if isinstance(given, Mapping) and values.dtype.kind == "f":
+        raise DiffractionError(f"hologram: {name} of labels need a picture of integers")
     try:
         if isinstance(given, Mapping):
-            if values.dtype.kind == "f":
-                raise DiffractionError(f"hologram: {name} of labels need a picture of integers")
-            dots = np.full(values.shape, np.nan)
-            for label, value in given.items():
-                dots[values == label] = float(value)
-            wrong: list[Any] = [value for value in given.values() if not np.isfinite(float(value))]
+            numbers, dots = list(map(float, given.values())), np.full(values.shape, np.nan)
+            for label, number in zip(given, numbers, strict=True):
+                dots[values == label] = number
         elif isinstance(given, tuple):
-            black, white = (float(end) for end in given)
+            numbers = black, white = [float(end) for end in given]
             dots = black + (white - black) * (values / full_scale)
-            wrong = [end for end in (black, white) if not np.isfinite(end)]
         else:
             dots = np.broadcast_to(np.asarray(given, float), values.shape)
-            wrong = [] if np.ndim(given) else [given] * int(not np.isfinite(dots).all())
+            numbers = [] if np.ndim(given) else [float(dots.flat[0])]
     except (TypeError, ValueError):
         raise DiffractionError(
             f"hologram: {name}={quoted(given)} must be a mapping from labels, a pair of black and "
             f"white, an array {values.shape}, or a number"
         ) from None
-    if wrong:
+    if wrong := [number for number in numbers if not np.isfinite(number)]:
         raise DiffractionError(f"hologram: {name}: {wrong[0]} must be a finite number")
     return np.asarray(dots, np.float64)
 

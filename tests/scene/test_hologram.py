@@ -111,6 +111,7 @@ def test_order_1_of_each_dot_is_where_its_grating_sends_it() -> None:
         ({"dot": 0}, "dot=0 must be a whole number"),
         ({"image": np.zeros((2, 3, 3), np.uint8)}, "expected an array \\(ny, nx\\)"),
         ({"image": np.full((2, 3), 1.5)}, "brightness must be between 0 and 1"),
+        ({"image": np.full((2, 3), 0.5)}, "periods of labels need a picture of integers"),
         ({"image": "missing.png"}, "missing.png"),
     ],
 )

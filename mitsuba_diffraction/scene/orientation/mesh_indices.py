@@ -40,20 +40,19 @@ class Element(NamedTuple):
 
     Attributes
     ----------
-    name, number : `vertex`, `face` or others, and how many.
+    number : of such elements.
     properties : words of each line after `property`: type and name, or `list`, two types and name.
     """
 
-    name: str
     number: int
     properties: list[list[str]]
 
 
 class Header(NamedTuple):
-    """Header of a PLY file: its format, elements, and the place where its content begins."""
+    """Header of a PLY file: its format, elements by name, and where its content begins."""
 
     format: str
-    elements: list[Element]
+    elements: dict[str, Element]
     size: int
 
     def type_of(self, word: str) -> np.dtype[Any]:
@@ -130,7 +129,7 @@ def ply_header(file: Path, shown: str) -> Header:
         if file.suffix.lower() not in (".obj", ".serialized"):
             todo = "convert it to PLY or OBJ"
         raise DiffractionError(f"{shown} is not a PLY, which is expected: {todo}")
-    form, elements = "", []
+    form, elements = "", dict[str, Element]()
     end = re.search(rb"\nend_header[ \t\r]*\n", start)
     if end is None:
         raise DiffractionError(
@@ -141,11 +140,12 @@ def ply_header(file: Path, shown: str) -> Header:
         if words[:1] == ["format"] and len(words) > 1:
             form = words[1]
         elif words[:1] == ["element"]:
-            if len(words) < 3 or not words[2].isdecimal() or len(words[2]) > 18:
+            number = words[2] if len(words) > 2 else ""
+            if not number.isdecimal() or len(number) > 18 or words[1] in elements:
                 raise DiffractionError(
-                    f"{shown}: {quoted(line.strip())} cannot be an element of a PLY"
+                    f"{shown}: {quoted(line.strip())} cannot be an element, or is there twice"
                 )
-            elements.append(Element(words[1], int(words[2]), []))
+            elements[words[1]] = element = Element(int(number), [])
         elif words[:1] == ["property"]:
             types = words[2:4] if words[1:2] == ["list"] else words[1:2]
             expected = 5 if words[1:2] == ["list"] else 3
@@ -153,14 +153,11 @@ def ply_header(file: Path, shown: str) -> Header:
                 raise DiffractionError(
                     f"{shown}: {quoted(line.strip())} cannot be a property of a PLY"
                 )
-            elements[-1].properties.append(words[1:expected])
-    names = [element.name for element in elements]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise DiffractionError(f"{shown}: element {quoted(twice[0])} is there twice")
-    for element in elements:
+            element.properties.append(words[1:expected])
+    for name, element in elements.items():
         if element.number and not element.properties:
             raise DiffractionError(
-                f"{shown}: element {quoted(element.name)} has no properties, {element.number} times"
+                f"{shown}: element {quoted(name)} has no properties, {element.number} times"
             )
     if form not in _FORMATS:
         raise DiffractionError(f"{shown}: a PLY of format {quoted(form)} cannot be read")
@@ -175,15 +172,15 @@ def read_ply(file: Path, shown: str) -> tuple[dict[str, NDArray[Any]], NDArray[A
     Raises a DiffractionError if the file is no PLY, is damaged, or has no triangles.
     """
     header = ply_header(file, shown)
-    elements = {element.name: element for element in header.elements}
-    vertex, face = (elements.get(name, Element(name, 0, [])) for name in ("vertex", "face"))
+    elements = header.elements
+    vertex, face = (elements.get(name, Element(0, [])) for name in ("vertex", "face"))
     content, triangles = header.content(file, shown), np.empty((0, 3), np.int64)
     try:
         if vertex.number and face.number:
-            if sum(e.number * header.row(e, 0).itemsize for e in header.elements) > len(content):
+            if sum(e.number * header.row(e, 0).itemsize for e in elements.values()) > len(content):
                 raise ValueError
             # lists have three numbers, as Mitsuba expects
-            sizes = [e.number * header.row(e, 3).itemsize for e in header.elements]
+            sizes = [e.number * header.row(e, 3).itemsize for e in elements.values()]
             at = dict(zip(elements, np.cumsum([0, *sizes]).tolist(), strict=False))
             triangles = _triangles(header, face, content, at["face"], vertex.number, shown)
             rows = np.frombuffer(content, header.row(vertex, 3), vertex.number, at["vertex"])
