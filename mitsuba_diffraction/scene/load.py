@@ -134,6 +134,7 @@ def _check_parameters_act(file: Path, values: SceneValues) -> None:
         config.unused_parameters = mi.LogLevel.Debug
         given = {name: v for name, v in values.parameters.items() if name != without}
         parsed = mi.parser.parse_file(config, str(file), **given)
+        mi.parser.transform_resolve_references(config, parsed)
         split_meshes(parsed, values.materials)
         if covered:  # without `mesh` there is another one, of other materials
             ids = parsed.id_to_index
@@ -187,6 +188,7 @@ def _instantiated(
                     f"'{path}' is included by malformed XML; write <include filename='NAME'/>, "
                     "without entities of a document type"
                 )
+        mi.parser.transform_resolve_references(config, state)
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)

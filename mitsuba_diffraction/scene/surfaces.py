@@ -136,7 +136,7 @@ def _reached(state: Any, nodes: Iterable[Any]) -> set[int]:
     """Return the numbers of the nodes within nodes, and within those."""
     waiting, reached = list(nodes), set[int]()
     while waiting:
-        new = {*targets_of(waiting.pop(), state.id_to_index).values()} - reached
+        new = {*targets_of(waiting.pop()).values()} - reached
         reached |= new
         waiting += [state.nodes[number] for number in new]
     return reached
@@ -262,23 +262,17 @@ def inner(state: Any, node: Any, kind: Any) -> dict[str, int]:
 
     kind : of `mi.ObjectType`.
     """
-    found = targets_of(node, state.id_to_index)
-    return {name: n for name, n in found.items() if state.nodes[n].type == kind}
+    return {name: n for name, n in targets_of(node).items() if state.nodes[n].type == kind}
 
 
-def targets_of(node: Any, ids: Mapping[str, int] | None = None) -> dict[str, int]:
-    """Return the numbers of the nodes within a node, by the names of its properties.
-
-    ids : numbers by id, to which references that Mitsuba has not resolved are looked up.
-    """
-    props, kinds = node.props, mi.Properties.Type
-    found = {}
-    for name in list(props.keys()):
-        if props.type(name) == kinds.ResolvedReference:
-            found[name] = int(props[name].index())
-        elif ids and props.type(name) == kinds.Reference and props[name].id() in ids:
-            found[name] = ids[props[name].id()]
-    return found
+def targets_of(node: Any) -> dict[str, int]:
+    """Return the numbers of the nodes within a node, by the names of its properties."""
+    props = node.props
+    return {
+        name: int(props[name].index())
+        for name in list(props.keys())
+        if props.type(name) == mi.Properties.Type.ResolvedReference
+    }
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:
