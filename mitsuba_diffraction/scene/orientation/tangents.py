@@ -142,7 +142,7 @@ class TangentReport:
             )
         remedy = "unwrap along the body in one piece"
         if self.has_orientation:
-            remedy = "make it with the command 'tangents' along another guide"
+            remedy = "choose another guide of the command 'tangents', --along smooth or body"
         if self.breaks:
             lines.append(
                 f"the patch's direction {self.breaking()}: colours will show seams; {remedy}"
@@ -153,7 +153,7 @@ class TangentReport:
                 f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: colours will "
                 f"show seams; use a finer mesh, or {remedy}"
             )
-        if self.mirrored > MOST_MIRRORED:
+        if self.mirrored > MOST_MIRRORED and not self.has_orientation:
             lines.append(
                 f"texture coordinates on {self.mirrored:.0%} of the surface are mirrored against "
                 "the rest, where u may run the other way, and the patch with it: flip those parts"
