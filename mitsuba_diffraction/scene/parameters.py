@@ -7,7 +7,7 @@ import difflib
 import os
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -146,25 +146,13 @@ def _walked(
     scene: Path, values: Mapping[str, str] | None
 ) -> tuple[dict[str, str | None] | None, list[Path]]:
     """Return the result of `parameters_of`, and the files that the elements of a scene name."""
-    walk, named = _Walk(values or {}), []
-    # the package's own scenes may be included from everywhere
-    roots = (scene.parent, STUDIO.parent)
+    walk = _Walk(values or {})
     try:
-        for element, folders in walk.elements(scene, (scene.parent, Path.cwd()), roots):
-            for value in element.attrib.values() if element.tag != "default" else ():
-                for name in _REFERENCE.findall(value):
-                    walk.defaults.setdefault(name, None)
-            text = ""
-            # Mitsuba looks for included files and spectra beside the file that names them
-            if element.tag in ("include", "spectrum"):
-                text = element.get("filename", "")
-            elif element.tag == "string" and element.get("name") in _FILES:
-                text, folders = element.get("value", ""), folders[1:]
-            if text:
-                named.append(_found(walk.filled(text), folders))
+        # the package's own scenes may be included from everywhere
+        walk.read(scene, (scene.parent, Path.cwd()), (scene.parent, STUDIO.parent))
     except _Unreadable:
-        return None, named
-    return walk.defaults, named
+        return None, walk.named
+    return walk.defaults, walk.named
 
 
 class _Walk:
@@ -174,38 +162,44 @@ class _Walk:
     ----------
     values : of parameters that the user has set: files that they name may lie anywhere.
     defaults : of all parameters so far; None without one.
+    named : files that the elements name.
     includes : number of includes so far, for each of which Mitsuba reads a file.
     """
 
     def __init__(self, values: Mapping[str, str]) -> None:
         self.values, self.includes = values, 0
         self.defaults: dict[str, str | None] = {}
+        self.named: list[Path] = []
 
-    def elements(
+    def read(
         self, file: Path, folders: Sequence[Path], roots: Sequence[Path], depth: int = 0
-    ) -> Iterator[tuple[ElementTree.Element, Sequence[Path]]]:
-        """Yield the elements of a file and of its includes, in Mitsuba's order.
+    ) -> None:
+        """Read the elements of a file and of its includes, in Mitsuba's order.
 
-        With each come the folders in which Mitsuba 3.9 looks for a name; the first is the folder of
-        the element's file.
-
-        folders : where Mitsuba looks for a name, after the file's own folder.
+        folders : where Mitsuba 3.9 looks for a name. Included files and spectra may lie beside the
+            file that names them, too.
         roots : folders within which includes have to lie.
         depth : of includes within each other.
         """
         for element in _root(file, depth).iter():
-            around, name = (file.parent, *folders), element.get("name", "")
-            if element.tag == "default" and self.defaults.get(name) is None:
-                self.defaults[name] = element.get("value", "")  # the first counts, as in Mitsuba
-            yield element, around
-            if element.tag == "path":
-                folder, _ = self._inner(file, element.get("value", ""), around, roots)
-                folders = (folder, *folders)
-            elif element.tag == "include":
-                inner = self._inner(file, element.get("filename", ""), around, roots)
+            tag, name, around = element.tag, element.get("name", ""), (file.parent, *folders)
+            text, value = element.get("filename", ""), element.get("value", "")
+            if tag != "default":
+                for each in _REFERENCE.findall(" ".join(element.attrib.values())):
+                    self.defaults.setdefault(each, None)
+            elif self.defaults.get(name) is None:
+                self.defaults[name] = value  # the first counts, as in Mitsuba
+            if tag in ("include", "spectrum") and text:
+                self.named.append(_found(self.filled(text), around))
+            elif tag == "string" and name in _FILES and value:
+                self.named.append(_found(self.filled(value), folders))
+            if tag == "path":
+                folders = (self._inner(file, value, around, roots)[0], *folders)
+            elif tag == "include":
+                inner, allowed = self._inner(file, text, around, roots)
                 self.includes += 1
                 check_count(self.includes, MOST_INCLUDES, f"'{file}'", "includes so far")
-                yield from self.elements(inner[0], folders, inner[1], depth + 1)
+                self.read(inner, folders, allowed, depth + 1)
 
     def filled(self, text: str) -> str:
         """Return a text with parameters replaced by their values, as far as they have one."""
