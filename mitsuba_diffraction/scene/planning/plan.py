@@ -134,12 +134,7 @@ def load_limited(load: Load, planned: Sequence[PlannedTable]) -> Any:
         for each in planned
         if each.settings is not None
     }
-
-    def table_of(request: TableRequest) -> DiffractionTable:
-        key = request.digest, request.settings
-        return request.cached(limited.get(key, request.settings))
-
-    with providing(table_of):
+    with providing(lambda r: r.cached(limited.get((r.digest, r.settings), r.settings))):
         return load()
 
 
