@@ -95,15 +95,16 @@ def load_scene(
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
     # Found inside twosided, blendbsdf and the like, too
-    within = {n: surfaces_within(shape.bsdf()) for n, shape in enumerate(scene.shapes())}
-    surfaces = {n: shape for n, shape in enumerate(scene.shapes()) if within[n]}
-    for number, shape in surfaces.items():
-        check_attributes(shape, number)
-    _warn_of_missing_uv(surfaces)
+    shapes, surfaces = {}, {}
+    for number, shape in enumerate(scene.shapes()):
+        if within := surfaces_within(shape.bsdf()):
+            name = name_of(shape, number)
+            shapes[name], surfaces[name] = shape, within
+            check_attributes(shape, name)
+    _warn_of_missing_uv(shapes)
     if values.orbit:
-        turn_cameras(scene.sensors(), surfaces.values() or scene.shapes(), values.orbit)
-    named = {name_of(shape, number): within[number] for number, shape in surfaces.items()}
-    check_bands(scene.sensors(), named, eye=bands is not None)
+        turn_cameras(scene.sensors(), shapes.values() or scene.shapes(), values.orbit)
+    check_bands(scene.sensors(), surfaces, eye=bands is not None)
     for edit in edits:
         if say is not None:
             say(edit.line(scene))
@@ -223,13 +224,9 @@ def _read_by_mitsuba(scene: Path) -> Iterator[None]:
         mi.set_file_resolver(before)
 
 
-def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
+def _warn_of_missing_uv(shapes: Mapping[str, Any]) -> None:
     """Warn of meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
-    lacking = [
-        name_of(shape, number)
-        for number, shape in surfaces.items()
-        if shape.is_mesh() and not has_texcoords(shape)
-    ]
+    lacking = [n for n, shape in shapes.items() if shape.is_mesh() and not has_texcoords(shape)]
     if lacking:
         warn(
             f"no texture coordinates on {'; '.join(lacking)}: the patch's direction is arbitrary "

@@ -262,7 +262,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     supported = []
     for number, shape in enumerate(scene.shapes()):
         name = name_of(shape, number)
-        check_attributes(shape, number)
+        check_attributes(shape, name)
         triangles = triangles_of(shape)
         if triangles is None:
             omissions.append(f"{name} ({shape.class_name()})")
