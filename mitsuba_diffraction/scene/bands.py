@@ -110,13 +110,11 @@ def check_bands(
     sees.
     """
     # spectral variants alone use a film's own responses
-    banded = [
-        s for s in sensors if mi.is_spectral and s.film().sensor_response_function() is not None
-    ]
-    ranges = [_recorded(sensor) for sensor in banded]
-    if not ranges:
+    banded = [s for s in sensors if s.film().sensor_response_function() is not None]
+    if not banded or not mi.is_spectral:
         return
-    first, last = min(low for low, _ in ranges), max(high for _, high in ranges)
+    lows, highs = zip(*map(_recorded, banded), strict=True)
+    first, last = min(lows), max(highs)
     for name, described in surfaces.items():
         for solved, served in dict.fromkeys((s.solved, s.wavelengths) for s in described):
             if lacking := _lacking(solved, served, first, last):

@@ -12,11 +12,11 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Real
-from ..errors import DiffractionError, check_choice, counted
+from ..errors import DiffractionError, check_choice
 from .orientation.directions import direction_field
 from .orientation.interchange import stated_up
 from .orientation.tangents import check_tangents
-from .orientation.trimesh import TriangleMesh, oriented_mesh
+from .orientation.trimesh import TriangleMesh, check_finite, oriented_mesh
 
 #: Values of `up`: the axis of the file that points upwards on the stage.
 UPS = ("auto", "x", "y", "z", "-x", "-y", "-z")
@@ -80,13 +80,7 @@ def fit_of(mesh: TriangleMesh, file: Path, up: str = "auto") -> MeshPlacement:
     """
     check_choice("up", up, UPS)
     positions = mesh.positions
-    lost = np.flatnonzero(~np.isfinite(positions).all(axis=1))
-    if len(lost):
-        raise DiffractionError(
-            f"mesh '{file}': vertex {lost[0]} is not finite "
-            f"({counted(len(lost), 'such vertex', 'such vertices')}); "
-            "repair the mesh"
-        )
+    check_finite(positions, f"mesh '{file}'")
     centred = positions - positions.mean(axis=0)
     squares, axes = np.linalg.eigh(centred.T @ centred)
     if squares[1] <= _LINE**2 * squares[2]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Real, Whole
-from ...errors import DiffractionError
+from ...errors import DiffractionError, counted
 
 #: Angle (rad) between the sides of an edge from which on it is sharp, if the sides have vertices of
 #: their own there, as a box has where its texture is cut.
@@ -233,6 +233,16 @@ def turned(directions: Real, normals: Real, turn: Real) -> Real:
     """
     cosine, sine = np.split(turn, 2, axis=-1)
     return cosine * directions + sine * np.cross(normals, directions)
+
+
+def check_finite(vertices: Real, shown: str) -> None:
+    """Raise a DiffractionError if a row (n, …) of vertices is not finite."""
+    lost = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(lost):
+        count = counted(len(lost), "such vertex", "such vertices")
+        raise DiffractionError(
+            f"{shown}: vertex {lost[0]} is not finite ({count}); repair the mesh"
+        )
 
 
 def unit(vectors: Real) -> Real:
