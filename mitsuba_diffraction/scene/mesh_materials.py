@@ -48,27 +48,27 @@ def split_meshes(state: Any, wanted: Collection[str]) -> list[str]:
         ids = set(wanted) - set(state.id_to_index)
         parts = {m.name: [o for o in materials if o.name == m.name] for m in materials}
         rest = [m for m in materials if m.name not in ids]
-        if len(rest) == len(materials) or not ids:
+        if len(rest) == len(materials):
             continue
         if others == OTHERS[0]:
             parts = {name: parts[name] for name in parts if name in ids}
             parts |= {props.id(): rest} if rest else {}
         surfaces = inner(state, state.nodes[number], mi.ObjectType.BSDF)
-        own = {name: others == OTHERS[1] and name not in ids for name in parts}
-        made = [copied(props, FITTED, leave=[*surfaces] if own[name] else ()) for name in parts]
-        numbers = {name: n for name, n in state.id_to_index.items() if n != number}
-        for n, (name, shape) in enumerate(zip(parts, made, strict=True)):
+        made = []
+        for name, part in parts.items():
+            own = others == OTHERS[1] and name not in ids
+            made.append(shape := copied(props, FITTED, leave=[*surfaces] if own else ()))
             shape.set_id(name)
-            shape[PART] = " ".join(str(material.number) for material in parts[name])
-            if own[name]:
-                shape[OWN] = parts[name][0].number
-            if n == 0:  # in place of the whole
-                state.nodes[number].props, at = shape, number
-            else:
-                added = appended(state, mi.ObjectType.Shape, shape)
-                at = added.index()
-                state.nodes[0].props[f"part_{at}"] = added
-            numbers[name] = at
+            shape[PART] = " ".join(str(material.number) for material in part)
+            if own:
+                shape[OWN] = part[0].number
+        numbers = {name: n for name, n in state.id_to_index.items() if n != number}
+        state.nodes[number].props = made[0]  # in place of the whole
+        numbers[made[0].id()] = number
+        for shape in made[1:]:
+            added = appended(state, mi.ObjectType.Shape, shape)
+            state.nodes[0].props[f"part_{added.index()}"] = added
+            numbers[shape.id()] = added.index()
         state.id_to_index = numbers
     return known
 
