@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.files import FileKind, kind_of
 from mitsuba_diffraction.heights import Recipe
-from mitsuba_diffraction.scene.parameters import check_parameters, parameters_of
+from mitsuba_diffraction.scene.parameters import parameters_of, scene_values
 from tests.support.scenes import SCENES, SMALL, rendered
 from tests.support.variants import use
 
@@ -59,7 +59,7 @@ def test_its_table_has_solved_orders(name: str) -> None:
 
 def test_heights_for_a_scene_of_solved_orders_have_a_way() -> None:
     with pytest.raises(DiffractionError, match="--assign ID=FILE"):
-        check_parameters(SCENES / "cd.xml", {"patch": "scan.png"})
+        scene_values(SCENES / "cd.xml", {"patch": "scan.png"})
 
 
 @pytest.mark.usefixtures("variant")

@@ -7,8 +7,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import mitsuba as mi
-
 from ..errors import DiffractionError
 from ..files import GLTF, MESHES, FileKind
 from ..gltf import materials_of
@@ -174,14 +172,12 @@ def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[st
 
 def _mesh(file: Path) -> dict[str, Any]:
     from ..scene.fitted_mesh import fit_of
-    from ..scene.orientation.mesh_files import read_mesh
+    from ..scene.orientation.mesh_files import load_mesh
     from ..scene.orientation.tangents import check_tangents
 
-    if mi.variant() is None:
-        mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
     with mitsuba_warnings():
-        read = read_mesh(file)
-        mesh, report = read.mesh, check_tangents(read.mesh)
+        mesh = load_mesh(file)
+        report = check_tangents(mesh)
     materials = {}
     if file.suffix.lower() in GLTF:  # names that --preset and --assign take
         materials["materials"] = [each.name for each in materials_of(file)] or ["none"]
@@ -195,6 +191,6 @@ def _mesh(file: Path) -> dict[str, Any]:
         "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
         **report.summary(),
         **materials,
-        "normals": "in the file" if read.own_normals else _SMOOTH,
+        "normals": "in the file" if mesh.own_normals else _SMOOTH,
         "fit of render MESH --patch FILE": fit,
     }

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..errors import DiffractionError, quoted
 from ..files import MESHES, OTHER_MESHES, FileKind, kind_of, readable_file
 from ..plugin.parameters import NAMES, REFLECTING
-from ..scene.parameters import Change, change_of
+from ..scene.parameters import MATERIAL, Change, change_of
 from ..scene.stage import STUDIO
 from .options import MODE, whole_number
 
@@ -61,7 +61,7 @@ def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
     A value given twice is a usage error. A mesh in place of a scene is put into the studio, with
     its surface, by `put_on_stage`.
     """
-    from ..scene.surfaces import MATERIAL, PRESET
+    from ..scene.surfaces import PRESET
 
     parameters = dict(args.parameters)
     if len(parameters) < len(args.parameters):

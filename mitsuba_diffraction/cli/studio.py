@@ -14,7 +14,7 @@ from ..heights.lengths import numbers_of
 from ..optics.materials import METALS, TISSUES
 from ..plugin.conductors import tabulated_range
 from ..scene.orbit import ORBIT
-from ..scene.parameters import parameters_of
+from ..scene.parameters import CLAMP, parameters_of
 from ..scene.pictures import check_panorama
 from ..scene.stage import STUDIO
 from .options import number_between
@@ -61,8 +61,6 @@ def take_studio(args: argparse.Namespace) -> None:
 
     Raises a DiffractionError if a file cannot be read.
     """
-    from ..scene.additions import CLAMP
-
     values: dict[str, str] = {}
     is_mesh = args.scene.suffix.lower() in MESHES
     if args.env is not None or args.sun is not None:

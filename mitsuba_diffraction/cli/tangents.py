@@ -44,10 +44,10 @@ def run(args: argparse.Namespace) -> Figures:
         no_guide = ": has no effect without a guide; add --along x, y, z or body"
         options.refuse(args, ["smoothing"], no_guide)
     check_outputs([args.output])
-    from ..scene.orientation.directions import direction_field, turned
+    from ..scene.orientation.directions import direction_field
     from ..scene.orientation.mesh_files import load_mesh, write_ply
-    from ..scene.orientation.tangents import BREAK, check_tangents
-    from ..scene.orientation.trimesh import oriented_mesh
+    from ..scene.orientation.tangents import check_tangents
+    from ..scene.orientation.trimesh import oriented_mesh, turned
 
     with Bar(args) as bar, mitsuba_warnings():
         bar(0, 0, "reading")
@@ -55,7 +55,9 @@ def run(args: argparse.Namespace) -> Figures:
         arrays = read.positions, read.normals, read.faces
         bar(0, 0, "solving for the field")
         field = direction_field(*arrays, args.along, smoothing=args.smoothing)
-        directions = turned(field.directions, read.normals, args.rotate)
+        angle = np.radians(args.rotate)
+        turn = np.array([np.cos(angle), np.sin(angle)])
+        directions = turned(field.directions, read.normals, turn)
         mesh = oriented_mesh(*arrays, directions, read.uv)
         bar(0, 0, "writing")
         write_ply(args.output, mesh, f"{args.mesh.name}, patch along {args.along}")
@@ -69,19 +71,8 @@ def run(args: argparse.Namespace) -> Figures:
         'in the scene: <texture type="mesh_attribute" name="orientation"><string name="name" '
         'value="vertex_orientation"/></texture> within the diffraction BSDF'
     )
-    if report.breaks:
-        others = " or ".join(guide for guide in ("smooth", "body") if guide != args.along)
-        # triangles may be too large for the field's rotation
-        finer = "use a finer mesh, or " if report.turns_fast else ""
-        say_warning(
-            f"the field {report.breaking()}: colours will show seams there; {finer}choose another "
-            f"guide, --along {others}"
-        )
-    elif report.turns_fast:
-        say_warning(
-            f"the field turns by over {BREAK:g} degrees within triangles on {report.turning:.0%} "
-            "of the surface: use a finer mesh, or another --along"
-        )
+    for problem in report.problems():
+        say_warning(problem)
     places = [{"at": at, "turns": n} for at, n in zip(field.singular, field.indices, strict=True)]
     return {"mesh": args.mesh, "files": [args.output], "along": args.along,
             "singular": places, "tangents": report}  # fmt: skip

@@ -6,7 +6,6 @@ load         variants set and scenes loaded
 mitsuba_errors  Mitsuba's errors in one line
 elements     names of elements, surfaces in their BSDFs, what a shape has to have
 nodes        checks of a parsed scene, before Mitsuba reads its files
-meshes       arrays of Mitsuba's meshes, of 3.9 and 3.10
 parameters   names that may be set, and values that change from frame to frame
 passes       rendering in passes of samples
 pictures     EXR and PNG of pictures
@@ -33,6 +32,6 @@ from .pictures import read_exr
 
 __all__ = [
     "Stop", "additions", "bands", "denoise", "elements", "fitted_mesh", "frames", "hologram",
-    "label", "load", "load_scene", "logo", "meshes", "orbit", "parameters", "passes",
+    "label", "load", "load_scene", "logo", "orbit", "parameters", "passes",
     "pictures", "read_exr", "render_passes", "set_variant", "stage", "surfaces",
 ]  # fmt: skip

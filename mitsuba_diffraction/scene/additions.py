@@ -1,82 +1,41 @@
-"""Values split, and meshes, lights and filters of a parsed scene changed before it is instantiated.
+"""Meshes, lights and filters of a parsed scene changed before it is instantiated.
 
 A shape of type `fitted_mesh` becomes a mesh on the stage (`fitted_mesh.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError, check_choice
-from ..plugin.parameters import NAMES
 from .fitted_mesh import FRAMES, fitted_mesh, framing, turned_around
-from .mesh_materials import FITTED, Part, own_bsdf
-from .orbit import ORBIT
-from .orientation.mesh_files import read_mesh, write_ply
+from .mesh_materials import FITTED, OWN, PART, own_bsdf
+from .orientation.mesh_files import load_mesh, write_ply
 from .orientation.trimesh import TriangleMesh
-from .surfaces import MATERIAL, REFLECTING, copied, inner, targets_of
-
-#: Scene parameter that limits samples, in units of white.
-CLAMP = "render:clamp"
+from .surfaces import copied, inner, targets_of
 
 # Properties of such a shape that say how its file is read
-_OF_FILE = ("filename", "fit", "up", "frame", "others")
+_OF_FILE = ("filename", "fit", "up", "frame", "others", PART, OWN)
 
 
-class SceneValues(NamedTuple):
-    """Values for a scene.
-
-    Attributes
-    ----------
-    parameters : of the scene's own parameters.
-    materials : surfaces by the id that they are put on.
-    surface : parameters of the BSDF, for all diffracting surfaces of the scene.
-    clamp : limit of samples in units of white, or None.
-    orbit : degrees by which the cameras are turned around the vertical.
-    """
-
-    parameters: dict[str, Any]
-    materials: dict[str, str]
-    surface: dict[str, Any]
-    clamp: float | None
-    orbit: float
-
-
-def split_values(values: Mapping[str, Any], known: Collection[str]) -> SceneValues:
-    """Separate values of a scene's parameters from surfaces for its ids and their parameters.
-
-    known : names of the scene's parameters, which precede the BSDF's.
-    """
-    materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
-    own = (CLAMP, ORBIT)
-    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k not in own}
-    surface = {k: v for k, v in rest.items() if k not in known and k in NAMES[REFLECTING]}
-    clamp = float(values[CLAMP]) if CLAMP in values else None
-    parameters = {k: v for k, v in rest.items() if k not in surface}
-    return SceneValues(parameters, materials, surface, clamp, float(values.get(ORBIT, 0.0)))
-
-
-def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
+def fit_meshes(state: Any, folder: Path) -> None:
     """Replace shapes of type `fitted_mesh` by PLY files of the fitted meshes.
 
     state : `mi.parser.ParserState`.
     folder : where the files are written.
-    parts : materials of shapes that are parts of their files, see `split_meshes`.
 
     Raises a DiffractionError if a file is not a mesh, or cannot be put on the stage.
     """
 
     @cache
-    def fitted(file: Path, fit: bool, up: str) -> tuple[TriangleMesh, Any]:
-        read = read_mesh(file)
-        return fitted_mesh(read, fit=fit, up=up), read.materials
+    def fitted(file: Path, fit: bool, up: str) -> TriangleMesh:
+        return fitted_mesh(load_mesh(file), file, fit=fit, up=up)
 
     for number, node in enumerate(state.nodes):
         if node.props.plugin_name() != FITTED:
@@ -87,18 +46,18 @@ def fit_meshes(state: Any, folder: Path, parts: Mapping[int, Part]) -> None:
         file = Path(str(mi.file_resolver().resolve(props["filename"])))
         fit, written = str(props.get("fit", "true")).lower(), folder / f"{number}.ply"
         check_choice("fit", fit, ("true", "false"))
-        mesh, materials = fitted(file, fit == "true", props.get("up", "auto"))
+        mesh = fitted(file, fit == "true", props.get("up", "auto"))
         _frame(state, mesh.positions, props)
-        part, own = parts.get(number, ([], False))
         ply = copied(props, "ply", leave=_OF_FILE)
-        if part:
-            chosen = np.isin(materials, [material.number for material in part])
+        if PART in props:
+            assert mesh.materials is not None
+            chosen = np.isin(mesh.materials, np.fromstring(props[PART], int, sep=" "))
             if not chosen.any():
                 raise DiffractionError(f"mesh '{file}': its scene has no triangles of the material "
                                        f"'{props.id()}'; delete that material")  # fmt: skip
             mesh = mesh.part(chosen)
-        if own:
-            ply["bsdf"] = own_bsdf(file, part[0])
+        if OWN in props:
+            ply["bsdf"] = own_bsdf(file, props[OWN])
         write_ply(written, mesh)
         ply["filename"] = str(written)
         ply.set_id(props.id())
@@ -130,23 +89,16 @@ def remove_dark_lights(state: Any) -> None:
 
     state : `mi.parser.ParserState`, its references resolved.
     """
-
-    nodes = state.nodes
     black = {
         number
-        for number, node in enumerate(nodes)
+        for number, node in enumerate(state.nodes)
         if node.props.plugin_name() == "d65" and float(node.props.get("scale", 1.0)) == 0.0
     }
     if not black:  # reading a property hides from Mitsuba that no plugin reads it
         return
-    dark = {
-        number
-        for number, node in enumerate(nodes)
-        if node.type == mi.ObjectType.Emitter and black.intersection(targets_of(node).values())
-    }
-    for node in nodes:
-        for name, target in targets_of(node).items():
-            if target in dark:
+    for node in state.nodes:
+        for name, number in inner(state, node, mi.ObjectType.Emitter).items():
+            if black.intersection(targets_of(state.nodes[number]).values()):
                 del node.props[name]
 
 

@@ -110,13 +110,11 @@ def check_bands(
     sees.
     """
     # spectral variants alone use a film's own responses
-    banded = [
-        s for s in sensors if mi.is_spectral and s.film().sensor_response_function() is not None
-    ]
-    ranges = [_recorded(sensor) for sensor in banded]
-    if not ranges:
+    banded = [s for s in sensors if s.film().sensor_response_function() is not None]
+    if not banded or not mi.is_spectral:
         return
-    first, last = min(low for low, _ in ranges), max(high for _, high in ranges)
+    lows, highs = zip(*map(_recorded, banded), strict=True)
+    first, last = min(lows), max(highs)
     for name, described in surfaces.items():
         for solved, served in dict.fromkeys((s.solved, s.wavelengths) for s in described):
             if lacking := _lacking(solved, served, first, last):
@@ -130,26 +128,20 @@ def _lacking(solved: bool, served: tuple[float, float], first: float, last: floa
 
     served : shortest and longest wavelength of the table, nm.
     """
-    low, high = served
-    begins_late = first < low - _MARGIN
-    if solved:
-        if not begins_late and last <= high + _MARGIN:
-            return ""
-        return (
-            f"is black outside {low:.4g} to {high:.4g} nm, the range of its table, and the camera "
-            f"records {first:.4g} to {last:.4g} nm; make the table with a wider range of "
-            "wavelengths"
-        )
-    ends_early = last > high + _MARGIN
-    faults = [f"is black below {low:.4g} nm, where its table begins"] if begins_late else []
-    if ends_early:
-        faults.append(f"has the values of {high:.4g} nm at all longer wavelengths")
+    (low, high), faults = served, []
+    if first < low - _MARGIN:
+        faults.append(f"is black below {low:.4g} nm, where its table begins")
+    if last > high + _MARGIN:
+        beyond = f"is black above {high:.4g} nm, where its table ends"
+        values = f"has the values of {high:.4g} nm at all longer wavelengths"
+        faults.append(beyond if solved else values)
     if not faults:
         return ""
-    wider = f"{first if begins_late else low:.4g}, {last if ends_early else high:.4g}"
+    wider = f"wavelength_range=({min(first, low):.4g}, {max(last, high):.4g})"
     return (
         f"{' and '.join(faults)}, and the camera records {first:.4g} to {last:.4g} nm; make the "
-        f"table with wavelength_range=({wider}) (the command 'precompute')"
+        f"table with {'a wider range of wavelengths' if solved else wider} "
+        f"(the command '{'solve' if solved else 'precompute'}')"
     )
 
 

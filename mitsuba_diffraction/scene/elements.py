@@ -14,7 +14,6 @@ from ..errors import DiffractionError, counted
 from ..plugin.description import Surface, describe
 from ..plugin.parameter_changes import children
 from ..plugin.textures import is_attribute
-from .meshes import has_texcoords
 
 #: What `mesh_files.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
@@ -76,16 +75,13 @@ def parts_of(thing: Any) -> Iterator[Any]:
             yield from parts_of(part)
 
 
-def check_attributes(shape: Any, number: int | None = None) -> None:
+def check_attributes(shape: Any, name: str) -> None:
     """Refuse a shape that lacks a mesh attribute or the UV coordinates that its BSDF reads.
 
     Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing, and with UV
     coordinates of each triangle.
 
-    Parameters
-    ----------
-    shape : `mi.Shape` of the variant that is set.
-    number : its place among the scene's shapes, counted from 0, to name one without an id.
+    shape, name : `mi.Shape` of the variant that is set, and its name by `name_of`.
 
     Raises a DiffractionError that names the attribute, and the way to get one of directions.
     """
@@ -93,27 +89,29 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
     placed = any(surface.coherence == "surface" for surface in surfaces)
     if placed and shape.is_mesh() and not has_texcoords(shape):
         raise DiffractionError(
-            f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
-            "places on the surface; unwrap it, or use coherence='ensemble'"
+            f"{name} has no UV coordinates, from which coherence='surface' has places on the "
+            "surface; unwrap it, or use coherence='ensemble'"
         )
     stretching = [attribute_of(surface.lateral_scale.texture) for surface in surfaces]
-    attributes = [name for part in parts_of(shape.bsdf()) if (name := attribute_of(part))]
-    for name in dict.fromkeys(attributes):
-        if np.all(shape.has_attribute(name)):
-            if name in stretching and (least := np.array(mi.traverse(shape)[name]).min()) <= 0.0:
+    attributes = [read for part in parts_of(shape.bsdf()) if (read := attribute_of(part))]
+    for read in dict.fromkeys(attributes):
+        if np.all(shape.has_attribute(read)):
+            if read in stretching and (least := np.array(mi.traverse(shape)[read]).min()) <= 0.0:
                 raise DiffractionError(
-                    f"{name_of(shape, number)}: lateral_scale reads the attribute {name}, whose "
-                    f"least number is {least:g}; factors must be above 0"
+                    f"{name}: lateral_scale reads the attribute {read}, whose least number is "
+                    f"{least:g}; factors must be above 0"
                 )
             continue
+        remedy = _MADE if read == ORIENTATION else "add it to the mesh's file, or correct the name"
         if not shape.is_mesh():
             remedy = "only meshes have any: leave the texture out, or use a mesh"
-        else:
-            added = "add it to the mesh's file, or correct the name"
-            remedy = _MADE if name == ORIENTATION else added
-        raise DiffractionError(
-            f"{name_of(shape, number)} has no attribute {name}, which its BSDF reads; {remedy}"
-        )
+        raise DiffractionError(f"{name} has no attribute {read}, which its BSDF reads; {remedy}")
+
+
+def has_texcoords(mesh: Any) -> bool:
+    """Return whether the vertices of a `mi.Mesh` have texture coordinates."""
+    name = "has_vertex_texcoords"  # Mitsuba 3.10 calls it without "vertex"
+    return bool(np.all(getattr(mesh, name if hasattr(mesh, name) else "has_texcoords")()))
 
 
 def attribute_of(thing: Any) -> str:

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.transform import Rotation
 
 from ..arrays import Real
-from ..errors import DiffractionError, check_choice, counted
+from ..errors import DiffractionError, check_choice
 from .orientation.directions import direction_field
 from .orientation.interchange import stated_up
-from .orientation.mesh_files import MeshFile
 from .orientation.tangents import check_tangents
-from .orientation.trimesh import TriangleMesh, oriented_mesh
+from .orientation.trimesh import TriangleMesh, check_finite, oriented_mesh
 
 #: Values of `up`: the axis of the file that points upwards on the stage.
 UPS = ("auto", "x", "y", "z", "-x", "-y", "-z")
@@ -80,13 +80,7 @@ def fit_of(mesh: TriangleMesh, file: Path, up: str = "auto") -> MeshPlacement:
     """
     check_choice("up", up, UPS)
     positions = mesh.positions
-    lost = np.flatnonzero(~np.isfinite(positions).all(axis=1))
-    if len(lost):
-        raise DiffractionError(
-            f"mesh '{file}': vertex {lost[0]} is not finite "
-            f"({counted(len(lost), 'such vertex', 'such vertices')}); "
-            "repair the mesh"
-        )
+    check_finite(positions, f"mesh '{file}'")
     centred = positions - positions.mean(axis=0)
     squares, axes = np.linalg.eigh(centred.T @ centred)
     if squares[1] <= _LINE**2 * squares[2]:
@@ -112,7 +106,9 @@ def fit_of(mesh: TriangleMesh, file: Path, up: str = "auto") -> MeshPlacement:
     return MeshPlacement(up, rotation, scale, shift, scale * (high - low))
 
 
-def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> TriangleMesh:
+def fitted_mesh(
+    mesh: TriangleMesh, file: Path, *, fit: bool = True, up: str = "auto"
+) -> TriangleMesh:
     """Return a mesh put on the stage, whose patch has a direction.
 
     The direction is the file's `vertex_orientation`; else ∂p/∂u where texture coordinates suit a
@@ -120,7 +116,7 @@ def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> Triang
 
     Raises a DiffractionError if the mesh does not fit.
     """
-    mesh, placed = read.mesh, fit_of(read.mesh, read.file, up)
+    placed = fit_of(mesh, file, up)
     if mesh.orientation is None and check_tangents(mesh).usable:
         mesh = replace(mesh, orientation=np.tile([1.0, 0.0], (len(mesh.positions), 1)))
     if fit:
@@ -129,7 +125,8 @@ def fitted_mesh(read: MeshFile, *, fit: bool = True, up: str = "auto") -> Triang
     if mesh.orientation is not None and mesh.uv is not None:
         return mesh
     field = direction_field(mesh.positions, mesh.normals, mesh.faces)
-    return oriented_mesh(mesh.positions, mesh.normals, mesh.faces, field.directions, mesh.uv)
+    made = oriented_mesh(mesh.positions, mesh.normals, mesh.faces, field.directions, mesh.uv)
+    return replace(made, materials=mesh.materials)
 
 
 def framing(positions: Real, camera: Real, tangents: tuple[float, float]) -> Real:
@@ -183,10 +180,7 @@ def _leaning(front: Real) -> Real:
     """Return the rotation (3, 3) after which a unit normal looks to the camera and upwards."""
     azimuth = math.atan2(-front[0], -front[1]) if np.hypot(*front[:2]) > _LINE else 0.0
     lean = math.radians(_LEANS) - math.asin(np.clip(front[2], -1.0, 1.0))
-    cos, sin = math.cos(azimuth), math.sin(azimuth)
-    around_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    cos, sin = math.cos(lean), math.sin(lean)
-    return np.array([[1.0, 0.0, 0.0], [0.0, cos, sin], [0.0, -sin, cos]]) @ around_z
+    return np.asarray(Rotation.from_euler("zx", [azimuth, -lean]).as_matrix())
 
 
 def _guessed_up(positions: Real, file: Path, flat: bool) -> str:

@@ -150,16 +150,12 @@ def hologram(
     if not lit.any():
         raise DiffractionError("hologram: no dot has a grating; check labels and periods")
     shortest, longest = float(lengths[lit].min()), float(lengths[lit].max())
-    if not PERIODS[0] <= shortest <= longest <= PERIODS[1]:
-        raise DiffractionError(
-            f"hologram: periods from {shortest:g} to {longest:g} µm must be between "
-            f"{PERIODS[0]:g} and {PERIODS[1]:g} µm"
-        )
     base = longest if period is None else float(period)
-    if not PERIODS[0] <= base <= PERIODS[1]:
-        raise DiffractionError(
-            f"hologram: period={period:g} must be between {PERIODS[0]:g} and {PERIODS[1]:g} µm"
-        )
+    for name, value in (("periods", shortest), ("periods", longest), ("period", base)):
+        if not PERIODS[0] <= value <= PERIODS[1]:
+            raise DiffractionError(
+                f"hologram: {name}={value:g} must be between {PERIODS[0]:g} and {PERIODS[1]:g} µm"
+            )
     turns = np.radians(np.where(lit, angles, 0.0))
     across = np.stack([np.cos(turns), np.sin(turns), np.zeros_like(turns)], axis=-1)
     disc = _disc(dot, values.size)
@@ -174,7 +170,13 @@ def hologram(
 
 def _picture(image: ArrayLike | str | os.PathLike[str]) -> tuple[NDArray[Any], float]:
     """Return numbers (ny, nx) of a picture, and the number of white."""
-    values = _read(Path(image)) if isinstance(image, str | os.PathLike) else np.asarray(image)
+    picture = read_picture(Path(image)) if isinstance(image, str | os.PathLike) else image
+    values = np.asarray(picture)
+    if isinstance(picture, Image.Image) and values.ndim != 2:
+        raise DiffractionError(
+            f"hologram: '{image!s}' has colours ({picture.mode}); save it in grey, or with a "
+            "palette whose indices are labels"
+        )
     if values.ndim != 2 or values.size == 0 or values.dtype.kind not in "buif":
         raise DiffractionError(
             f"hologram: expected an array (ny, nx) of numbers, got shape {values.shape} of "
@@ -187,42 +189,29 @@ def _picture(image: ArrayLike | str | os.PathLike[str]) -> tuple[NDArray[Any], f
     return values, 1.0 if values.dtype.kind == "b" else float(np.iinfo(values.dtype).max)
 
 
-def _read(path: Path) -> NDArray[Any]:
-    picture = read_picture(path)
-    mode, values = picture.mode, np.array(picture)
-    if values.ndim != 2:
-        raise DiffractionError(
-            f"hologram: '{path}' has colours ({mode}); save it in grey, or with a palette whose "
-            "indices are labels"
-        )
-    return values
-
-
 def _of_dots(
     name: str, given: Values, values: NDArray[Any], full_scale: float
 ) -> NDArray[np.float64]:
     """Return a quantity at the dots (ny, nx), or NaN."""
+    if isinstance(given, Mapping) and values.dtype.kind == "f":
+        raise DiffractionError(f"hologram: {name} of labels need a picture of integers")
     try:
         if isinstance(given, Mapping):
-            if values.dtype.kind == "f":
-                raise DiffractionError(f"hologram: {name} of labels need a picture of integers")
-            dots = np.full(values.shape, np.nan)
-            for label, value in given.items():
-                dots[values == label] = float(value)
-            wrong: list[Any] = [value for value in given.values() if not np.isfinite(float(value))]
+            numbers, dots = list(map(float, given.values())), np.full(values.shape, np.nan)
+            for label, number in zip(given, numbers, strict=True):
+                dots[values == label] = number
         elif isinstance(given, tuple):
-            black, white = (float(end) for end in given)
+            numbers = black, white = [float(end) for end in given]
             dots = black + (white - black) * (values / full_scale)
-            wrong = [end for end in (black, white) if not np.isfinite(end)]
         else:
             dots = np.broadcast_to(np.asarray(given, float), values.shape)
-            wrong = [] if np.ndim(given) else [given] * int(not np.isfinite(dots).all())
+            numbers = [] if np.ndim(given) else [float(dots.flat[0])]
     except (TypeError, ValueError):
         raise DiffractionError(
             f"hologram: {name}={quoted(given)} must be a mapping from labels, a pair of black and "
             f"white, an array {values.shape}, or a number"
         ) from None
-    if wrong:
+    if wrong := [number for number in numbers if not np.isfinite(number)]:
         raise DiffractionError(f"hologram: {name}: {wrong[0]} must be a finite number")
     return np.asarray(dots, np.float64)
 

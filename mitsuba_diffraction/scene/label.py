@@ -21,7 +21,7 @@ from ..plugin.presets import PATCHES
 from .fitted_mesh import fitted_mesh
 from .hologram import Files
 from .logo import HUES, Areas, logo, wavelengths_of
-from .orientation.mesh_files import read_mesh
+from .orientation.mesh_files import load_mesh
 from .stage import STUDIO
 
 #: Length of the tangential part of ω_i + ω_o: periods of 1.0 to 1.4 µm are blue to red.
@@ -98,14 +98,14 @@ def front(
     Raises a DiffractionError if the mesh has no texture coordinates, no area of them there, or a
     seam of them within the label, or if its normals point inwards there.
     """
-    read = read_mesh(file)
-    if read.mesh.uv is None:
+    read = load_mesh(file)
+    if read.uv is None:
         raise DiffractionError(
             f"mesh '{file}' has no texture coordinates, which a label needs; unwrap it, e.g. in "
             "Blender"
         )
-    mesh = fitted_mesh(read, up=up)
-    uv = read.mesh.uv[read.mesh.faces]  # before coordinates without area are replaced
+    mesh = fitted_mesh(read, file, up=up)
+    uv = read.uv[read.faces]  # before coordinates without area are replaced
 
     def place_at(turn: float) -> LabelPlace:
         sin, cos = math.sin(math.radians(turn)), math.cos(math.radians(turn))
@@ -113,10 +113,7 @@ def front(
         corners = (mesh.positions @ rotation.T)[mesh.faces]
         sides = np.ptp(corners.reshape(-1, 3), axis=0)
         normals = (mesh.normals @ rotation.T)[mesh.faces]
-        try:
-            return _place(corners, normals, uv, width * sides[0], height * sides[2], aspect)
-        except DiffractionError as error:
-            raise DiffractionError(f"mesh '{file}': {error}") from error
+        return _place(file, corners, normals, uv, width * sides[0], height * sides[2], aspect)
 
     def serves(turn: float) -> bool:
         try:
@@ -136,13 +133,14 @@ def front(
 
 
 def _place(
-    corners: Real, normals: Real, uv: Real, wide: float, z: float, aspect: float
+    file: Path, corners: Real, normals: Real, uv: Real, wide: float, z: float, aspect: float
 ) -> LabelPlace:
     """Return the place of a label on the side that looks to −y.
 
     Raises a DiffractionError if that side's normals point away from −y, or its texture coordinates
     have no area in the label's middle.
 
+    file : mesh, named in errors.
     corners, normals, uv : (m, 3, 3 or 2) of the triangles' corners.
     wide, z : width of the label and height of its middle, cm.
     """
@@ -156,7 +154,8 @@ def _place(
     number, weights, normal = normal_at(z)
     if normal[1] > 0.0:
         raise DiffractionError(
-            "its normals point inwards at the label; turn them outwards, e.g. in Blender"
+            f"mesh '{file}': its normals point inwards at the label; turn them outwards, e.g. in "
+            "Blender"
         )
     level = math.hypot(normal[0], normal[1])
     right, high = np.array([-normal[1], normal[0], 0.0]) / level, wide / aspect
@@ -167,8 +166,8 @@ def _place(
     steps = (uv[number, 1:] - uv[number, 0]).T
     if abs(np.linalg.det(steps)) < 1e-12:
         raise DiffractionError(
-            "its texture coordinates have no area in the label's middle; unwrap it again, or turn "
-            "another side to the front"
+            f"mesh '{file}': its texture coordinates have no area in the label's middle; unwrap it "
+            "again, or turn another side to the front"
         )
     linear = flat @ np.linalg.inv(steps)
     shift = -linear @ (weights @ uv[number])
@@ -189,24 +188,18 @@ def _in_front(corners: Real, x: float, z: float, normals: Real) -> tuple[int, Re
 
     Where no triangle is, it is the nearest one that faces −y, and False.
     """
-    a, b, c = np.moveaxis(corners[..., [0, 2]], 1, 0)
-    point = np.array([x, z])
-
-    def area(p: Real, q: Real, r: Real) -> Real:
-        return np.asarray(
-            (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
-            - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
-        )
-
-    whole = area(a, b, c)
-    parts = np.stack([area(point, b, c), area(a, point, c), area(a, b, point)], 1)
-    weights = parts / np.where(whole == 0.0, np.nan, whole)[:, None]
+    around = corners[..., [0, 2]] - [x, z]
+    # twice the areas between the point and the sides opposite to the corners
+    (a, b), (c, d) = (np.moveaxis(np.roll(around, -n, axis=1), -1, 0) for n in (1, 2))
+    parts = a * d - b * c
+    whole = parts.sum(axis=1, keepdims=True)
+    weights = parts / np.where(whole == 0.0, np.nan, whole)
     hit = (weights >= -1e-9).all(axis=1)
     if hit.any():
         depth = np.where(hit, np.einsum("ij,ij->i", weights, corners[..., 1]), np.inf)
         number = int(depth.argmin())
         return number, weights[number], True
-    away = np.linalg.norm(corners.mean(axis=1)[:, [0, 2]] - point, axis=1)
+    away = np.linalg.norm(around.mean(axis=1), axis=1)
     number = int(np.where(normals[:, 1] < 0.0, away, np.inf).argmin())
     return number, np.full(3, 1.0 / 3.0), False
 

@@ -19,18 +19,16 @@ from ..llvm import require_llvm
 from ..plugin import installed
 from ..system import memory
 from .bands import SensorBands, check_bands, put_bands, wider_tables
-from .elements import check_attributes, name_of, surfaces_within
-from .meshes import has_texcoords
+from .elements import check_attributes, has_texcoords, name_of, surfaces_within
 from .mitsuba_errors import error_of
 from .orbit import turn_cameras
-from .parameters import check_parameters, files_of, parameters_of
+from .parameters import SceneValues, files_of, scene_values
 
 if TYPE_CHECKING:
-    from .additions import SceneValues
     from .surfaces import Edit
 
-# mi.load_file's own arguments: a scene parameter of that name could not be passed.
-_TAKEN = ("path", "parallel", "optimize")
+# Arguments of Mitsuba's `parse_file`: a scene parameter of that name could not be passed.
+_TAKEN = ("config", "filename")
 # Least memory of a pixel: film, bitmap and one path of a wavefront.
 _BYTES_PER_PIXEL = 128
 # Dr.Jit's names of the backends that need a GPU
@@ -82,34 +80,31 @@ def load_scene(
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
-    from .additions import split_values
-
     readable_file(file)
-    defaults = parameters_of(file, parameters) or {}
-    values = split_values(parameters, defaults)
-    known = files_of(file, values.parameters, with_sources=False)
+    values = scene_values(file, parameters)
+    known = files_of(file, values.parameters)
     for each in known:
         note_input(each)
-    check_parameters(file, values.parameters)
     for name in _TAKEN:
         if name in values.parameters:
             raise DiffractionError(f"parameter {name!r}: Mitsuba reserves this name; rename it")
     serving = contextlib.nullcontext() if bands is None else wider_tables(bands.first)
     with serving, _read_by_mitsuba(file):
-        _check_parameters_act(file, values, defaults)
+        _check_parameters_act(file, values)
         scene, edits = _instantiated(file, known, values, box_filter, bands)
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
     # Found inside twosided, blendbsdf and the like, too
-    within = {n: surfaces_within(shape.bsdf()) for n, shape in enumerate(scene.shapes())}
-    surfaces = {n: shape for n, shape in enumerate(scene.shapes()) if within[n]}
-    for number, shape in surfaces.items():
-        check_attributes(shape, number)
-    _warn_of_missing_uv(surfaces)
+    shapes, surfaces = {}, {}
+    for number, shape in enumerate(scene.shapes()):
+        if within := surfaces_within(shape.bsdf()):
+            name = name_of(shape, number)
+            shapes[name], surfaces[name] = shape, within
+            check_attributes(shape, name)
+    _warn_of_missing_uv(shapes)
     if values.orbit:
-        turn_cameras(scene.sensors(), surfaces.values() or scene.shapes(), values.orbit)
-    named = {name_of(shape, number): within[number] for number, shape in surfaces.items()}
-    check_bands(scene.sensors(), named, eye=bands is not None)
+        turn_cameras(scene.sensors(), shapes.values() or scene.shapes(), values.orbit)
+    check_bands(scene.sensors(), surfaces, eye=bands is not None)
     for edit in edits:
         if say is not None:
             say(edit.line(scene))
@@ -123,16 +118,12 @@ def check_values(file: Path, parameters: Mapping[str, Any]) -> None:
 
     Raises a DiffractionError with the parameter's place in the scene.
     """
-    from .additions import split_values
-
-    values = split_values(parameters, parameters_of(file, parameters) or {})
+    values = scene_values(file, parameters)
     with _read_by_mitsuba(file):
         mi.parser.parse_file(mi.parser.ParserConfig(mi.variant()), str(file), **values.parameters)
 
 
-def _check_parameters_act(
-    file: Path, values: SceneValues, defaults: Mapping[str, str | None]
-) -> None:
+def _check_parameters_act(file: Path, values: SceneValues) -> None:
     """Refuse values other than the defaults that only BSDFs read which surfaces on ids replace."""
     from .mesh_materials import split_meshes
     from .surfaces import effective, put_materials
@@ -144,6 +135,7 @@ def _check_parameters_act(
         config.unused_parameters = mi.LogLevel.Debug
         given = {name: v for name, v in values.parameters.items() if name != without}
         parsed = mi.parser.parse_file(config, str(file), **given)
+        mi.parser.transform_resolve_references(config, parsed)
         split_meshes(parsed, values.materials)
         if covered:  # without `mesh` there is another one, of other materials
             ids = parsed.id_to_index
@@ -151,7 +143,7 @@ def _check_parameters_act(
         return effective(parsed)
 
     for name, value in values.parameters.items() if values.materials else ():
-        if defaults.get(name) in (None, str(value)):
+        if values.defaults.get(name) in (None, str(value)):
             continue
         # a value may be the default in other words: 0.0 for 0, the whole path of a file
         before, after = (read("", covered) != read(name, covered) for covered in (False, True))
@@ -197,11 +189,12 @@ def _instantiated(
                     f"'{path}' is included by malformed XML; write <include filename='NAME'/>, "
                     "without entities of a document type"
                 )
+        mi.parser.transform_resolve_references(config, state)
         installed.check_plugins(state)
         installed.search_first()  # before the scene's folder
         _check_films(state)
-        of_meshes, parts = split_meshes(state, values.materials)
-        fit_meshes(state, Path(folder), parts)
+        of_meshes = split_meshes(state, values.materials)
+        fit_meshes(state, Path(folder))
         edits = put_materials(state, values.materials, of_meshes)
         edits += put_surface_parameters(state, values.surface)
         mi.parser.transform_all(config, state)
@@ -231,13 +224,9 @@ def _read_by_mitsuba(scene: Path) -> Iterator[None]:
         mi.set_file_resolver(before)
 
 
-def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
+def _warn_of_missing_uv(shapes: Mapping[str, Any]) -> None:
     """Warn of meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
-    lacking = [
-        name_of(shape, number)
-        for number, shape in surfaces.items()
-        if shape.is_mesh() and not has_texcoords(shape)
-    ]
+    lacking = [n for n, shape in shapes.items() if shape.is_mesh() and not has_texcoords(shape)]
     if lacking:
         warn(
             f"no texture coordinates on {'; '.join(lacking)}: the patch's direction is arbitrary "

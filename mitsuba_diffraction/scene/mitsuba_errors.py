@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from pathlib import PurePath
 
 from ..errors import DiffractionError, one_line
 
@@ -28,19 +27,6 @@ _INSTANTIATE = r'failed to instantiate (\w+) plugin of type "([^"]+)": '
 _TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: (?=\S))?")
 # Exceptions of a Python plugin that say nothing about the scene
 _NO_ERROR = re.compile(r"^(KeyboardInterrupt|MemoryError|SystemExit): ?(\d*)", re.M)
-
-
-def _no_ply(match: re.Match[str]) -> str:
-    """Return the remedy for a mesh of another format where a PLY is expected."""
-    file, why = PurePath(match[1]), match[2]
-    todo = f"run the command 'tangents {file} -o mesh.ply' first, and use mesh.ply"
-    if not why.startswith("invalid PLY"):
-        return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
-    if file.suffix.lower() in (".ply", ""):
-        return f"'{file}' is a damaged PLY: {why}; export the mesh again"
-    if file.suffix.lower() not in (".obj", ".serialized"):
-        todo = "convert it to PLY or OBJ"
-    return f"'{file}' is not a PLY mesh, which the scene expects: {todo}"
 
 
 def _unused(match: re.Match[str]) -> str:
@@ -71,7 +57,9 @@ _REWRITTEN: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":',
      r"\1 '\2' has no such parameter:"),
     (r'Error while loading PLY file "([^"]+)": (?:"[^"]+": )?'
-     r"((?:invalid PLY|incompatible contents|trailing tokens) .*)", _no_ply),
+     r"(?:incompatible contents|trailing tokens) .*",
+     r"'\1' has polygons, of which Mitsuba reads only triangles: run the command 'tangents \1 "
+     r"-o mesh.ply' first, and use mesh.ply"),
     (r"\n\s*- ", " "),  # lists
     (r"Found unused parameters?: (.*)", _unused),
     (_INSTANTIATE, r"\1 '\2': "),

@@ -13,13 +13,12 @@ from ..files import FileKind, kind_of, readable_file, refuse_pipe
 from ..images import open_image
 from ..limits import MOST_NESTED, check_content, check_count, tree_sizes
 from ..streams import without_chatter
-from .orientation.mesh_files import KINDS
 from .orientation.mesh_indices import check_mesh
 from .surfaces import targets_of
 
 # Mitsuba's plugins that read a picture
 _PICTURES = ("bitmap", "envmap")
-_MESHES = tuple(KINDS.values())
+_MESHES = ("ply", "obj", "serialized")
 
 
 def check_nodes(state: Any) -> None:

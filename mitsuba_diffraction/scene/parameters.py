@@ -7,9 +7,10 @@ import difflib
 import os
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from ..errors import DiffractionError, quoted
 from ..files import FileKind, kind_of, refuse_pipe
@@ -17,8 +18,14 @@ from ..gltf import named_files
 from ..heights.lengths import numbers_of
 from ..inputs import note_input
 from ..limits import DEEPEST_ELEMENT, DEEPEST_INCLUDE, MOST_INCLUDES, check_count
+from ..plugin.parameters import NAMES, REFLECTING
+from .orbit import ORBIT
 from .stage import STUDIO
 
+#: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
+MATERIAL = "material:"
+#: Scene parameter that limits samples, in units of white.
+CLAMP = "render:clamp"
 _REFERENCE = re.compile(r"\$(\w+)")
 # Parameters of Mitsuba's plugins and of this package's whose text is the name of a file.
 _FILES = ("filename", "heightfield", "table", "layers", "pigment")
@@ -26,30 +33,58 @@ _FILES = ("filename", "heightfield", "table", "layers", "pigment")
 Numbers = tuple[float, ...]
 
 
-def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
-    """Refuse parameters given on the command line that the scene, an XML file, does not have.
+class SceneValues(NamedTuple):
+    """Values for a scene.
 
-    Raises a DiffractionError if one is unknown; the text lists the scene's and its includes,
-    with defaults.
+    Attributes
+    ----------
+    parameters : of the scene's own parameters.
+    defaults : of all the scene's parameters; None where the scene has none.
+    materials : surfaces by the id that they are put on.
+    surface : parameters of the BSDF, for all diffracting surfaces of the scene.
+    clamp : limit of samples in units of white, or None.
+    orbit : degrees by which the cameras are turned around the vertical.
     """
+
+    parameters: dict[str, Any]
+    defaults: dict[str, str | None]
+    materials: dict[str, str]
+    surface: dict[str, Any]
+    clamp: float | None
+    orbit: float
+
+
+def scene_values(scene: Path, values: Mapping[str, Any]) -> SceneValues:
+    """Separate values of a scene's parameters from surfaces for its ids and their parameters.
+
+    The scene's parameters precede those of the BSDF.
+
+    Raises a DiffractionError if the scene, an XML file, has no parameter of a name; the text lists
+    the parameters of the scene and its includes, with defaults.
+    """
+    materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
+    own = (CLAMP, ORBIT)
+    rest = {k: v for k, v in values.items() if not k.startswith(MATERIAL) and k not in own}
     known = parameters_of(scene, values)
-    if known is None:
-        return  # Mitsuba's own error describes the file
-    for name in values:
-        if name in known:
-            continue
-        if not known:
-            raise DiffractionError(f"'{scene}' has no parameters; leave {name} out")
+    surface = {k: v for k, v in rest.items() if k not in (known or ()) and k in NAMES[REFLECTING]}
+    parameters = {k: v for k, v in rest.items() if k not in surface}
+    unknown = [name for name in parameters if known is not None and name not in known]
+    if unknown and not known:
+        raise DiffractionError(f"'{scene}' has no parameters; leave {unknown[0]} out")
+    if known and unknown:
         listed = ", ".join(
             name if default is None else f"{name}={default}" for name, default in known.items()
         )
-        close = difflib.get_close_matches(name, known, 1)
+        close = difflib.get_close_matches(unknown[0], known, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
-        if name == "patch":
+        if unknown[0] == "patch":
             hint = "; put heights on the id of a BSDF or shape: --assign ID=FILE,material=Al"
         raise DiffractionError(
-            f"'{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"
+            f"'{scene}' has no parameter {unknown[0]!r}; it has (with defaults) {listed}{hint}"
         )
+    clamp = float(values[CLAMP]) if CLAMP in values else None
+    orbit = float(values.get(ORBIT, 0.0))
+    return SceneValues(parameters, known or {}, materials, surface, clamp, orbit)
 
 
 def parameters_of(
@@ -64,43 +99,21 @@ def parameters_of(
 
     Raises a DiffractionError if an include is a pipe, or outside of the scene's folder.
     """
-    document = _Document.of_scene(scene, values)
-    try:
-        for element, _ in document.elements():
-            for value in element.attrib.values() if element.tag != "default" else ():
-                for name in _REFERENCE.findall(value):
-                    document.defaults.setdefault(name, None)
-    except _Unreadable:
-        return None
-    return document.defaults
+    return _walked(scene, values)[0]
 
 
-def files_of(
-    scene: Path, values: Mapping[str, str] | None = None, *, with_sources: bool = True
-) -> list[Path]:
+def files_of(scene: Path, values: Mapping[str, str] | None = None) -> list[Path]:
     """List the scene, its includes, and every file that plugins, recipes or glTF files read.
 
-    Raises a DiffractionError if a file is a pipe or a device, for which Mitsuba would wait; if an
-    include lies outside of the scene's folder; or if a recipe is wrong.
-
-    with_sources : whether recipes are read, for the files that they name.
+    Raises a DiffractionError if a file is a pipe or a device, for which Mitsuba would wait, or an
+    include lies outside of the scene's folder.
     """
     from ..heights import Recipe
 
     files: dict[Path, None] = {}
     waiting = [scene]
     if scene.suffix.lower() == ".xml":  # else heights or a recipe
-        document = _Document.of_scene(scene, values)
-        with contextlib.suppress(_Unreadable):
-            for element, folders in document.elements():
-                text = ""
-                # Mitsuba looks for included files and spectra beside the file that names them
-                if element.tag in ("include", "spectrum"):
-                    text = element.get("filename", "")
-                elif element.tag == "string" and element.get("name") in _FILES:
-                    text, folders = element.get("value", ""), folders[1:]
-                if text:
-                    waiting.append(_found(document.filled(text), folders))
+        waiting += _walked(scene, values)[1]
     while waiting:
         file = waiting.pop()
         refuse_pipe(file)
@@ -108,8 +121,9 @@ def files_of(
             continue
         files[file] = None
         waiting += named_files(file)
-        if with_sources and kind_of(file) is FileKind.RECIPE:
-            waiting += Recipe.load(file).sources
+        if kind_of(file) is FileKind.RECIPE:
+            with contextlib.suppress(DiffractionError):  # its reader refuses a wrong recipe
+                waiting += Recipe.load(file).sources
     return list(files)
 
 
@@ -128,83 +142,64 @@ class _Unreadable(Exception):
     """An included file is missing, and Mitsuba says so."""
 
 
-@dataclass(frozen=True)
-class _Document:
-    """A scene, or a file that it includes.
+def _walked(
+    scene: Path, values: Mapping[str, str] | None
+) -> tuple[dict[str, str | None] | None, list[Path]]:
+    """Return the result of `parameters_of`, and the files that the elements of a scene name."""
+    walk = _Walk(values or {})
+    try:
+        # the package's own scenes may be included from everywhere
+        walk.read(scene, (scene.parent, Path.cwd()), (scene.parent, STUDIO.parent))
+    except _Unreadable:
+        return None, walk.named
+    return walk.defaults, walk.named
+
+
+class _Walk:
+    """Walk over a scene and its includes.
 
     Attributes
     ----------
-    file : the file.
-    folders : where Mitsuba looks for a name, after the file's own folder.
-    roots : folders within which includes have to lie.
     values : of parameters that the user has set: files that they name may lie anywhere.
     defaults : of all parameters so far; None without one.
-    depth : of includes within each other.
-    includes : number of includes of the scene so far, for each of which Mitsuba reads a file.
+    named : files that the elements name.
+    includes : number of includes so far, for each of which Mitsuba reads a file.
     """
 
-    file: Path
-    folders: tuple[Path, ...]
-    roots: tuple[Path, ...]
-    values: Mapping[str, str]
-    defaults: dict[str, str | None] = field(default_factory=dict)
-    depth: int = 0
-    includes: list[int] = field(default_factory=lambda: [0])
+    def __init__(self, values: Mapping[str, str]) -> None:
+        self.values, self.includes = values, 0
+        self.defaults: dict[str, str | None] = {}
+        self.named: list[Path] = []
 
-    @classmethod
-    def of_scene(cls, scene: Path, values: Mapping[str, str] | None) -> _Document:
-        # the package's own scenes may be included from everywhere
-        roots = (scene.parent, STUDIO.parent)
-        return cls(scene, (scene.parent, Path.cwd()), roots, values or {})
+    def read(
+        self, file: Path, folders: Sequence[Path], roots: Sequence[Path], depth: int = 0
+    ) -> None:
+        """Read the elements of a file and of its includes, in Mitsuba's order.
 
-    def root(self) -> ElementTree.Element:
-        """Return the outermost element.
-
-        Raises a DiffractionError for pipes, malformed XML, and elements too far within each other.
+        folders : where Mitsuba 3.9 looks for a name. Included files and spectra may lie beside the
+            file that names them, too.
+        roots : folders within which includes have to lie.
+        depth : of includes within each other.
         """
-        refuse_pipe(self.file)
-        if self.depth > DEEPEST_INCLUDE or not os.path.isfile(self.file):
-            raise _Unreadable
-        depth = 0
-        try:
-            with open(self.file, "rb") as stream:
-                for event, element in ElementTree.iterparse(stream, ("start", "end")):
-                    depth += 1 if event == "start" else -1
-                    check_count(
-                        depth, DEEPEST_ELEMENT, f"'{self.file}'", "elements within each other"
-                    )
-                    if depth == 0:
-                        root = element
-            return root
-        except ElementTree.ParseError as error:
-            raise DiffractionError(
-                f"'{self.file}' is malformed XML ({error}); mend it, since Mitsuba may read it "
-                "differently"
-            ) from error
-        except DiffractionError:
-            raise
-        except (OSError, ValueError) as error:
-            raise _Unreadable from error
-
-    def elements(self) -> Iterator[tuple[ElementTree.Element, tuple[Path, ...]]]:
-        """Yield the elements of the file and of its includes, in Mitsuba's order.
-
-        With each come the folders in which Mitsuba 3.9 looks for a name; the first is the folder of
-        the element's file.
-        """
-        folders = self.folders
-        for element in self.root().iter():
-            around, name = (self.file.parent, *folders), element.get("name", "")
-            if element.tag == "default" and self.defaults.get(name) is None:
-                self.defaults[name] = element.get("value", "")  # the first counts, as in Mitsuba
-            yield element, around
-            if element.tag == "path":
-                folders = (self.inner(element.get("value", ""), around).file, *folders)
-            elif element.tag == "include":
-                inner = self.inner(element.get("filename", ""), around)
-                self.includes[0] += 1
-                check_count(self.includes[0], MOST_INCLUDES, f"'{self.file}'", "includes so far")
-                yield from inner.elements()
+        for element in _root(file, depth).iter():
+            tag, name, around = element.tag, element.get("name", ""), (file.parent, *folders)
+            text, value = element.get("filename", ""), element.get("value", "")
+            if tag != "default":
+                for each in _REFERENCE.findall(" ".join(element.attrib.values())):
+                    self.defaults.setdefault(each, None)
+            elif self.defaults.get(name) is None:
+                self.defaults[name] = value  # the first counts, as in Mitsuba
+            if tag in ("include", "spectrum") and text:
+                self.named.append(_found(self.filled(text), around))
+            elif tag == "string" and name in _FILES and value:
+                self.named.append(_found(self.filled(value), folders))
+            if tag == "path":
+                folders = (self._inner(file, value, around, roots)[0], *folders)
+            elif tag == "include":
+                inner, allowed = self._inner(file, text, around, roots)
+                self.includes += 1
+                check_count(self.includes, MOST_INCLUDES, f"'{file}'", "includes so far")
+                self.read(inner, folders, allowed, depth + 1)
 
     def filled(self, text: str) -> str:
         """Return a text with parameters replaced by their values, as far as they have one."""
@@ -212,21 +207,49 @@ class _Document:
             lambda match: self.values.get(match[1]) or self.defaults.get(match[1]) or match[0], text
         )
 
-    def inner(self, text: str, folders: tuple[Path, ...]) -> _Document:
-        """Return an include, or the folder of a <path>, of this name.
+    def _inner(
+        self, file: Path, text: str, folders: Sequence[Path], roots: Sequence[Path]
+    ) -> tuple[Path, Sequence[Path]]:
+        """Return an include, or the folder of a <path>, of this name, and the roots within it.
 
         Raises a DiffractionError if it lies outside of all roots.
         """
-        name, roots = self.filled(text), self.roots
+        name = self.filled(text)
         path = _found(name, folders)
         if text.startswith("$") and text[1:] in self.values:
-            roots = (*roots, path.parent)
-        elif not any(path.resolve().is_relative_to(folder.resolve()) for folder in roots):
+            return path, (*roots, path.parent)
+        if not any(path.resolve().is_relative_to(folder.resolve()) for folder in roots):
             raise DiffractionError(
-                f"'{self.file}' includes {quoted(name)}, which is outside of the scene's folder; "
+                f"'{file}' includes {quoted(name)}, which is outside of the scene's folder; "
                 "copy it there, or make the name a parameter of the scene, and set that by -D"
             )
-        return replace(self, file=path, folders=folders, roots=roots, depth=self.depth + 1)
+        return path, roots
+
+
+def _root(file: Path, depth: int) -> ElementTree.Element:
+    """Return the outermost element of a file that is included at this depth.
+
+    Raises a DiffractionError for pipes, malformed XML, and elements too far within each other.
+    """
+    refuse_pipe(file)
+    if depth > DEEPEST_INCLUDE or not os.path.isfile(file):
+        raise _Unreadable
+    depth = 0
+    try:
+        with open(file, "rb") as stream:
+            for event, element in ElementTree.iterparse(stream, ("start", "end")):
+                depth += 1 if event == "start" else -1
+                check_count(depth, DEEPEST_ELEMENT, f"'{file}'", "elements within each other")
+                root = element
+        return root
+    except ElementTree.ParseError as error:
+        raise DiffractionError(
+            f"'{file}' is malformed XML ({error}); mend it, since Mitsuba may read it differently"
+        ) from error
+    except DiffractionError:
+        raise
+    except (OSError, ValueError) as error:
+        raise _Unreadable from error
 
 
 def _found(name: str, folders: Sequence[Path]) -> Path:

@@ -26,8 +26,6 @@ from ..plugin.presets import MATERIALS, find_preset
 from ..plugin.presets import PLUGIN as PRESET_PLUGIN
 from .elements import own_id, surfaces_within
 
-#: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
-MATERIAL = "material:"
 #: Beginning of a surface that is a preset: `preset:NAME[,parameter=value…]`.
 PRESET = "preset:"
 
@@ -94,8 +92,6 @@ def put_materials(
     for name, number in numbers.items():
         if twice := [other for other, n in numbers.items() if n == number and other != name]:
             raise DiffractionError(f"{name!r} and {twice[0]!r}: both ids are of one BSDF; keep one")
-        if not (state.nodes[number].type == mi.ObjectType.Shape or _shapes_with(state, number)):
-            raise DiffractionError(f"no shape uses the BSDF {name!r}; {_used_ids(state)}")
     # BSDFs first: a shape takes over what lies beneath its own surface
     for name, number in sorted(
         numbers.items(), key=lambda pair: state.nodes[pair[1]].type == mi.ObjectType.Shape
@@ -117,14 +113,6 @@ def put_materials(
     return edits
 
 
-def _used_ids(state: Any) -> str:
-    """Return a sentence on the BSDFs with an id that shapes use."""
-    used = [name for name, n in sorted(state.id_to_index.items(), key=lambda pair: pair[1])
-            if state.nodes[n].type == mi.ObjectType.BSDF and own_id(name)
-            and _shapes_with(state, n)]  # fmt: skip
-    return f"shapes use {', '.join(used)}" if used else "name the shape instead"
-
-
 def _shapes_with(state: Any, number: int) -> tuple[str, ...]:
     """Return the ids of the shapes that use a BSDF, directly or within another one."""
     return tuple(
@@ -138,7 +126,7 @@ def _reached(state: Any, nodes: Iterable[Any]) -> set[int]:
     """Return the numbers of the nodes within nodes, and within those."""
     waiting, reached = list(nodes), set[int]()
     while waiting:
-        new = {*targets_of(waiting.pop(), state.id_to_index).values()} - reached
+        new = {*targets_of(waiting.pop()).values()} - reached
         reached |= new
         waiting += [state.nodes[number] for number in new]
     return reached
@@ -189,18 +177,22 @@ def _parameters_of(node: Any) -> tuple[str, ...]:
 
 
 def _node_of(state: Any, name: str, of_meshes: Sequence[str]) -> int:
-    """Return the number of the BSDF or shape of this id."""
-    kinds = (mi.ObjectType.BSDF, mi.ObjectType.Shape)
-    known = {k: n for k, n in state.id_to_index.items() if state.nodes[n].type in kinds}
-    if name not in known:
-        listed = ", ".join(sorted(known, key=lambda k: (known[k], k)))
-        meshes = f"; materials of its meshes are {', '.join(of_meshes)}" if of_meshes else ""
-        raise DiffractionError(
-            f"no BSDF or shape of the scene has the id {name!r}, and no material of its glTF "
-            f"meshes this name; there are {listed or 'none: add id attributes to the scene'}"
-            f"{meshes}"
-        )
-    return int(known[name])
+    """Return the number of the shape of this id, or of the BSDF, which a shape uses."""
+    shape, bsdf = mi.ObjectType.Shape, mi.ObjectType.BSDF
+    numbers = {k: n for k, n in state.id_to_index.items() if own_id(k)}
+
+    def serves(number: int) -> bool:
+        kind = state.nodes[number].type
+        return kind == shape or (kind == bsdf and bool(_shapes_with(state, number)))
+
+    if name in numbers and serves(numbers[name]):
+        return int(numbers[name])
+    known = (k for k, n in sorted(numbers.items(), key=lambda pair: pair[::-1]) if serves(n))
+    meshes = f"; materials of its meshes are {', '.join(of_meshes)}" if of_meshes else ""
+    raise DiffractionError(
+        f"no shape has the id {name!r}, and no shape uses a BSDF, or a material of a glTF mesh, "
+        f"{name!r}; there are {', '.join(known) or 'none: add id attributes to the scene'}{meshes}"
+    )
 
 
 def _put(state: Any, number: int, text: str) -> None:
@@ -264,23 +256,17 @@ def inner(state: Any, node: Any, kind: Any) -> dict[str, int]:
 
     kind : of `mi.ObjectType`.
     """
-    found = targets_of(node, state.id_to_index)
-    return {name: n for name, n in found.items() if state.nodes[n].type == kind}
+    return {name: n for name, n in targets_of(node).items() if state.nodes[n].type == kind}
 
 
-def targets_of(node: Any, ids: Mapping[str, int] | None = None) -> dict[str, int]:
-    """Return the numbers of the nodes within a node, by the names of its properties.
-
-    ids : numbers by id, to which references that Mitsuba has not resolved are looked up.
-    """
-    props, kinds = node.props, mi.Properties.Type
-    found = {}
-    for name in list(props.keys()):
-        if props.type(name) == kinds.ResolvedReference:
-            found[name] = int(props[name].index())
-        elif ids and props.type(name) == kinds.Reference and props[name].id() in ids:
-            found[name] = ids[props[name].id()]
-    return found
+def targets_of(node: Any) -> dict[str, int]:
+    """Return the numbers of the nodes within a node, by the names of its properties."""
+    props = node.props
+    return {
+        name: int(props[name].index())
+        for name in list(props.keys())
+        if props.type(name) == mi.Properties.Type.ResolvedReference
+    }
 
 
 def _surface(state: Any, text: str, beneath: int | None) -> Any:

@@ -14,7 +14,7 @@ import OpenEXR
 import pytest
 
 from mitsuba_diffraction import OrderTable
-from mitsuba_diffraction.scene.parameters import check_parameters, files_of
+from mitsuba_diffraction.scene.parameters import files_of, scene_values
 from tests.support.coarse import little_light
 from tests.support.logos import drawn, write_board
 from tests.support.room import plate_file
@@ -161,7 +161,7 @@ def test_a_card_is_a_folder_that_needs_no_other_file(run, logo):
     folder = scene.parent.resolve()
     assert {file.resolve().parent for file in files_of(scene)} == {folder}
     assert {file.name for file in files_of(scene)} == set(os.listdir(folder))
-    check_parameters(scene, {"camera_azimuth": "0", "ring_radius": "1", "light": "ring.xml"})
+    scene_values(scene, {"camera_azimuth": "0", "ring_radius": "1", "light": "ring.xml"})
 
 
 def test_a_label_lies_on_the_front_of_a_mesh(run, logo):

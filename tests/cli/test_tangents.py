@@ -116,8 +116,8 @@ def test_a_field_that_breaks_along_lines_is_said_with_their_length(run, here):
     assert ran.code == 0
     assert "smooth everywhere" not in ran.out
     assert "no singular points, but breaks (turns by over 60 degrees) along lines of 1" in ran.out
-    assert "warning: the field breaks" in ran.err
-    assert "another guide, --along smooth or body" in ran.err
+    assert "warning: the patch's direction breaks" in ran.err
+    assert "another guide of the command 'tangents', --along smooth or body" in ran.err
     data = json.loads(run("info", "field.ply", "--json").out)
     assert not data["usable"]
     # half a cell of 2π · 0.4 / 24 beside the circle of radius 1
@@ -141,6 +141,6 @@ def test_triangles_too_coarse_for_a_field_are_said(run, here):
              (there, here_, 0 * here_ + 48), (here_ + 24, there + 24, 0 * here_ + 49)]  # fmt: skip
     obj_of(here / "can.obj", places, np.concatenate([np.stack(f, 1) for f in faces]))
     ran = run("tangents", "can.obj", "-o", "field.ply", "--along", "z")
-    assert "warning: the field breaks" in ran.err
+    assert "warning: the patch's direction breaks" in ran.err
     assert "use a finer mesh, or choose another guide" in ran.err
     assert not json.loads(run("info", "field.ply", "--json").out)["usable"]

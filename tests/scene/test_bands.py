@@ -163,7 +163,7 @@ def test_solved_orders_are_named_with_their_own_range(scene, tmp_path):
     thin_grating(0.6, counts=(2, 2, 1)).save(tmp_path / "orders.nc")
     shape = surface(heights="orders.nc").replace('"diffraction"', '"diffraction_orders"')
     file = scene(shape, spans=[(200.0, 600.0)])
-    line = r"black outside [\d.]+ to [\d.]+ nm, .* make the table with a wider range of wave"
+    line = r"is black below [\d.]+ nm, .* make the table with a wider range of wave"
     with pytest.warns(md.DiffractionWarning, match=line):
         load_scene(file, {})
 

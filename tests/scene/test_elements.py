@@ -36,20 +36,20 @@ def plate(name: str):
 )
 def test_an_attribute_that_is_missing_is_named_with_what_to_do(name, remedy):
     with pytest.raises(DiffractionError, match=f"no attribute {name}.*{remedy}"):
-        check_attributes(plate(name))
+        check_attributes(plate(name), "a plate")
 
 
 def test_one_that_is_there_is_read():
     mesh = plate("vertex_color")
     mesh.add_attribute("vertex_color", 3, [0.2] * 9)
-    check_attributes(mesh)
+    check_attributes(mesh, name_of(mesh))
 
 
 def test_places_need_uv_coordinates():
     mesh = plate("vertex_color")
     mesh.set_bsdf(mi.load_dict(bsdf_dict(PATCH, **ON_SURFACE)))
     with pytest.raises(DiffractionError, match="no UV coordinates, from which coherence='surface'"):
-        check_attributes(mesh)
+        check_attributes(mesh, name_of(mesh))
 
 
 def test_a_mesh_attribute_that_is_not_positive_is_refused():
@@ -59,7 +59,7 @@ def test_a_mesh_attribute_that_is_not_positive_is_refused():
     mesh = mi.Mesh("plate", 3, 1, has_vertex_texcoords=True, props=props)
     mesh.add_attribute("vertex_period", 1, [0.5, 1.0, 0.0])
     with pytest.raises(DiffractionError, match="vertex_period, whose least number is 0"):
-        check_attributes(mesh)
+        check_attributes(mesh, name_of(mesh))
 
 
 class Element:

@@ -1,13 +1,9 @@
-"""Meshes put on the stage: upright, standing on the floor, within what the camera sees.
-
-Their arrays are read alike from Mitsuba 3.9's flat buffers and from 3.10's tensors.
-"""
+"""Meshes put on the stage: upright, standing on the floor, within what the camera sees."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -16,6 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.scene.elements import has_texcoords
 from mitsuba_diffraction.scene.fitted_mesh import (
     STAGE_HEIGHT,
     STAGE_RADIUS,
@@ -24,7 +21,7 @@ from mitsuba_diffraction.scene.fitted_mesh import (
     framing,
     turned_around,
 )
-from mitsuba_diffraction.scene.meshes import has_texcoords, mesh_arrays
+from mitsuba_diffraction.scene.orientation.mesh_files import mesh_arrays
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
 
 FILE = Path("table.obj")
@@ -135,58 +132,10 @@ def test_a_mesh_that_turns_stays_within_its_sweep():
     assert radius.max() == pytest.approx(np.hypot(positions[:, 0], positions[:, 1]).max())
 
 
-# a square of two triangles
-POSITIONS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
-NORMALS = np.tile(np.float32([0, 0, 1]), (4, 1))
-UV = np.ascontiguousarray(POSITIONS[:, :2])
-TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
-
-
-def mesh_of(**values: Any) -> Any:
-    """An object whose methods return these values."""
-    return SimpleNamespace(**{name: lambda value=value: value for name, value in values.items()})
-
-
-#: The same square, in every way in which Mitsuba presents it.
-SQUARES = {
-    "3.9": mesh_of(
-        vertex_positions_buffer=POSITIONS.ravel(), vertex_normals_buffer=NORMALS.ravel(),
-        vertex_texcoords_buffer=UV.ravel(), faces_buffer=TRIANGLES.ravel(),
-        has_vertex_normals=True, has_vertex_texcoords=True,
-    ),
-    "3.10": mesh_of(
-        positions=POSITIONS, normals=NORMALS, texcoords=UV, faces=TRIANGLES,
-        position_index=np.empty(0, np.uint32), normal_index=np.empty(0, np.uint32),
-        has_normals=True, has_texcoords=True,
-    ),
-    "3.10, shared": mesh_of(
-        positions=POSITIONS[::-1], normals=NORMALS[:1], texcoords=UV, faces=TRIANGLES,
-        position_index=np.uint32([3, 2, 1, 0]), normal_index=np.zeros(4, np.uint32),
-        has_normals=True, has_texcoords=True,
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("version", SQUARES)
-def test_arrays_have_a_row_for_each_vertex_and_face(version: str):
-    arrays = mesh_arrays(SQUARES[version])
-    for values, expected in zip(arrays[:4], (POSITIONS, NORMALS, UV, TRIANGLES), strict=True):
-        np.testing.assert_array_equal(values, expected)
-
-
-@pytest.mark.parametrize(
-    "names",
-    [
-        ("vertex_positions_buffer", "faces_buffer", "has_vertex_normals", "has_vertex_texcoords"),
-        ("positions", "faces", "has_normals", "has_texcoords"),
-    ],
-    ids=["3.9", "3.10"],
-)
-def test_bare_mesh_has_neither_normals_nor_texture_coordinates(names: tuple[str, ...]):
-    bare = mesh_of(**dict(zip(names, (POSITIONS, TRIANGLES, False, False), strict=True)))
-    assert not has_texcoords(bare)
-    assert mesh_arrays(bare)[1:3] == (None, None)
-    np.testing.assert_array_equal(mesh_arrays(bare).faces, TRIANGLES)
+@pytest.mark.parametrize("name", ["has_vertex_texcoords", "has_texcoords"], ids=["3.9", "3.10"])
+def test_texture_coordinates_are_found_by_either_name(name: str):
+    for present in (True, False):
+        assert has_texcoords(SimpleNamespace(**{name: lambda p=present: p})) == present
 
 
 @pytest.mark.parametrize("name", ["scalar_rgb", "llvm_ad_rgb"])
@@ -202,3 +151,13 @@ def test_mesh_of_the_installed_mitsuba_is_read(name: str):
         "fc,fc->f", arrays.positions[arrays.faces[:, 0]], arrays.normals[arrays.faces[:, 0]]
     )
     np.testing.assert_allclose(across, 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["scalar_rgb", "llvm_ad_rgb"])
+def test_mesh_without_normals_and_texture_coordinates_has_neither(name: str, tmp_path: Path):
+    mi.set_variant(name)
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    file = {"type": "obj", "filename": str(tmp_path / "a.obj"), "face_normals": True}
+    arrays = mesh_arrays(mi.load_dict(file))
+    assert arrays[1:3] == (None, None)
+    np.testing.assert_array_equal(arrays.faces, [[0, 1, 2]])

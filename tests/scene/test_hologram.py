@@ -100,7 +100,7 @@ def test_order_1_of_each_dot_is_where_its_grating_sends_it() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"periods": {1: 0.01}}, "periods from 0.01 to 0.01 µm must be between 0.1 and 100"),
+        ({"periods": {1: 0.01}}, "periods=0.01 must be between 0.1 and 100"),
         ({"periods": {5: 1.0}}, "no dot has a grating"),
         ({"periods": {1: np.nan}}, "periods: nan must be a finite number"),
         ({"periods": (0.8, 1.2)}, "both be of labels"),
@@ -111,6 +111,7 @@ def test_order_1_of_each_dot_is_where_its_grating_sends_it() -> None:
         ({"dot": 0}, "dot=0 must be a whole number"),
         ({"image": np.zeros((2, 3, 3), np.uint8)}, "expected an array \\(ny, nx\\)"),
         ({"image": np.full((2, 3), 1.5)}, "brightness must be between 0 and 1"),
+        ({"image": np.full((2, 3), 0.5)}, "periods of labels need a picture of integers"),
         ({"image": "missing.png"}, "missing.png"),
     ],
 )

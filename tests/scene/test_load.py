@@ -50,12 +50,6 @@ CASES = {
     "[parser.cpp:451] Error while loading a.xml (line 1, col 25): while processing <include>:\n"
     '[parser.cpp:451] Error while loading b.xml (line 3, col 5): could not parse integer value "c"':
     "'b.xml', line 3: while processing <include>: could not parse integer value \"c\"",
-    '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
-    '[ply.cpp:136] Error while loading PLY file "/m/ball.obj": "/m/ball.obj": invalid PLY header: '
-    'unknown token "#"!': (
-        "'a.xml', line 2: shape 'ply': '/m/ball.obj' is not a PLY mesh, which the scene expects: "
-        "run the command 'tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
-    ),
     '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "obj": '
     '[OBJMesh] Error while loading OBJ file "a.obj": reference to invalid vertex 4294967293!': (
         "'a.xml', line 2: shape 'obj': Error while loading OBJ file \"a.obj\": it names vertex -3, "

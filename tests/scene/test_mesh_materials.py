@@ -11,7 +11,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.load import load_scene
-from mitsuba_diffraction.scene.orientation.mesh_files import read_mesh
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from mitsuba_diffraction.scene.stage import STUDIO
 from mitsuba_diffraction.scene.surfaces import own_id
 from tests.support.logos import RED, write_boxes
@@ -85,7 +85,7 @@ def test_materials_of_an_obj_file_are_named_as_not_supported(tmp_path):
     lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1", *faces]
     (tmp_path / "a.obj").write_text("\n".join(lines))
     with pytest.warns(md.DiffractionWarning, match=r"not supported \(Red paint, Blue\)"):
-        assert len(read_mesh(tmp_path / "a.obj").mesh.faces) == 2
+        assert len(load_mesh(tmp_path / "a.obj").faces) == 2
 
 
 def test_what_a_material_of_the_file_loses_is_said(boxes, tmp_path, recwarn):

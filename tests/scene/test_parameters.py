@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.scene.load import load_scene
-from mitsuba_diffraction.scene.parameters import check_parameters, files_of, parameters_of
+from mitsuba_diffraction.scene.parameters import files_of, parameters_of, scene_values
 from mitsuba_diffraction.scene.stage import STUDIO
 from tests.support.room import scene_file
 
@@ -43,7 +43,7 @@ def test_of_two_defaults_the_first_counts(tmp_path):
 
 def test_an_unknown_parameter_is_answered_with_those_there_are(scene):
     with pytest.raises(DiffractionError) as caught:
-        check_parameters(scene, {"sp": "4"})
+        scene_values(scene, {"sp": "4"})
     text = str(caught.value)
     assert "no parameter 'sp'; it has (with defaults) spp=16, part=light" in text
     assert text.endswith("did you mean spp?")
@@ -59,7 +59,7 @@ def test_a_given_value_chooses_the_include(scene):
 
 def test_a_scene_without_parameters_says_so(tmp_path):
     with pytest.raises(DiffractionError, match="has no parameters"):
-        check_parameters(scene_file(tmp_path), {"spp": "1"})
+        scene_values(scene_file(tmp_path), {"spp": "1"})
 
 
 def test_a_circle_of_includes_ends(tmp_path):
@@ -71,7 +71,7 @@ def test_files_that_are_no_xml_are_refused(tmp_path_factory, content):
     file = tmp_path_factory.mktemp("any") / "scene.xml"
     file.write_bytes(content)
     with pytest.raises(DiffractionError, match=f"'{file}'"):
-        check_parameters(file, {"spp": "1"})
+        scene_values(file, {"spp": "1"})
 
 
 @pytest.fixture
@@ -171,7 +171,7 @@ def test_only_files_that_plugins_read_are_listed(folder):
         '<shape type="ply"><string name="filename" value="../mesh.ply"/></shape>',
         '<include filename="parts/nested.xml"/>',
     )
-    names = {file.name for file in files_of(scene, with_sources=False)}
+    names = {file.name for file in files_of(scene)}
     assert names == {
         "scene.xml", "heights.npy", "table.nc", "layers.toml", "index.spd", "mesh.ply",
         "nested.xml", "light.xml",

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.additions import CLAMP
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orbit import vertical
+from mitsuba_diffraction.scene.parameters import CLAMP
 from tests.support.room import scene_file, skin
 
 METAL = skin('<string name="material" value="$material"/>')
@@ -125,6 +125,14 @@ def test_bright_samples_keep_their_colour_and_others_are_as_they_were(wall):
     assert (whole == 0).any()
     assert limited[~bright] == pytest.approx(whole[~bright])
     assert limited[bright] == pytest.approx(whole[bright] / 2)  # 4, 2, 1 becomes 2, 1, 0.5
+
+
+@pytest.mark.parametrize("name", ["config", "filename"])
+def test_names_that_mitsuba_takes_for_itself_are_refused(name, tmp_path):
+    mi.set_variant("scalar_rgb")
+    file = scene_file(tmp_path, f'<default name="{name}" value="1"/>')
+    with pytest.raises(DiffractionError, match=f"'{name}': Mitsuba reserves this name"):
+        load_scene(file, {name: "2"})
 
 
 def test_paths_from_lamps_are_refused(wall):

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...errors import DiffractionError
-from ...scene.elements import check_attributes, name_of
-from ...scene.meshes import has_texcoords, mesh_arrays
+from ...scene.elements import check_attributes, has_texcoords, name_of
+from ...scene.orientation.mesh_files import mesh_arrays
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lanes import uploaded
@@ -262,7 +262,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     supported = []
     for number, shape in enumerate(scene.shapes()):
         name = name_of(shape, number)
-        check_attributes(shape, number)
+        check_attributes(shape, name)
         triangles = triangles_of(shape)
         if triangles is None:
             omissions.append(f"{name} ({shape.class_name()})")

@@ -3,7 +3,7 @@
 Contents
 --------
 trimesh      `TriangleMesh`: arrays; `oriented_mesh`: one whose patch follows a field
-mesh_files   `read_mesh`, `write_ply`; PLY files of polygons
+mesh_files   `load_mesh`, `write_ply`; PLY files of polygons
 mesh_indices  mesh files checked before Mitsuba reads them
 interchange  meshes of glTF and USD files
 tangents     `check_tangents`: whether a mesh has the tangents that a patch needs, where they break
@@ -13,7 +13,7 @@ directions   `direction_field`: a smooth field of directions on any mesh
 from __future__ import annotations
 
 from .directions import GUIDES, DirectionField, direction_field
-from .mesh_files import MeshFile, load_mesh, read_mesh, write_ply
+from .mesh_files import load_mesh, write_ply
 from .tangents import TangentReport, check_tangents
 from .trimesh import (
     TriangleMesh,
@@ -24,8 +24,8 @@ from .trimesh import (
 )
 
 __all__ = [
-    "GUIDES", "DirectionField", "MeshFile", "TangentReport", "TriangleMesh", "cell_corners",
+    "GUIDES", "DirectionField", "TangentReport", "TriangleMesh", "cell_corners",
     "check_tangents", "direction_field", "directions", "grid_faces", "load_mesh",
-    "mesh_files", "oriented_mesh", "read_mesh", "tangents", "texture_tangents", "trimesh",
+    "mesh_files", "oriented_mesh", "tangents", "texture_tangents", "trimesh",
     "write_ply",
 ]  # fmt: skip

@@ -26,7 +26,7 @@ from scipy.sparse.linalg import splu
 from ...arrays import Complex, Real, Whole
 from ...errors import DiffractionError, check_choice
 from .tangents import carried
-from .trimesh import across, tangential, unit
+from .trimesh import across, check_finite, tangential, unit
 
 #: Guides that a field may follow.
 GUIDES = ("smooth", "x", "y", "z", "body")
@@ -181,12 +181,7 @@ def direction_field(
     check_choice("along", along, GUIDES)
     if not 1e-4 <= smoothing <= 1.0:
         raise DiffractionError(f"directions: smoothing = {smoothing:g} is outside 0.0001 to 1")
-    lost = np.flatnonzero(~np.isfinite(np.hstack([positions, normals])).all(axis=1))
-    if len(lost):
-        raise DiffractionError(
-            f"mesh: the position or normal of vertex {lost[0]} is not finite ({len(lost)} such "
-            "vertices); repair the mesh"
-        )
+    check_finite(np.hstack([positions, normals]), "mesh")
     surface = WeldedMesh.weld(positions, normals, faces)
     if along == "smooth":
         field = _smoothest(surface)
@@ -203,12 +198,6 @@ def direction_field(
         surface.positions[surface.faces[singular]].mean(axis=1),
         indices[singular],
     )
-
-
-def turned(directions: Real, normals: Real, degrees: float) -> Real:
-    """Directions (n, 3) turned around their normals, counter-clockwise seen from outside."""
-    angle = np.radians(degrees)
-    return np.cos(angle) * directions + np.sin(angle) * np.cross(normals, directions)
 
 
 def _smoothest(surface: WeldedMesh) -> Complex:

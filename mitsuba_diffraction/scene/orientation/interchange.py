@@ -5,7 +5,7 @@ Texture coordinates are Mitsuba's, whose v runs downwards in a picture, as Mitsu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,8 @@ from ...files import GLTF, USD, path_beside, readable_file, refuse_pipe
 from ...gltf import load_gltf
 from ...inputs import note_input
 from ...limits import MOST_PLACED, bounded_memory, check_content, check_count
-from ..meshes import MeshArrays
-from .mesh_indices import check_indices
-from .trimesh import unit
+from .mesh_indices import check_indices, fans
+from .trimesh import MeshArrays, unit
 
 
 def interchange_mesh(file: Path) -> MeshArrays:
@@ -50,14 +49,9 @@ def interchange_mesh(file: Path) -> MeshArrays:
     if not parts:
         raise DiffractionError(f"mesh '{file}': it has no triangles")
     starts = np.cumsum([0, *(len(part.positions) for part in parts)])
-    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-    return MeshArrays(
-        np.concatenate([part.positions for part in parts]),
-        _joined([part.normals for part in parts]),
-        _joined([part.uv for part in parts]),
-        np.concatenate(faces),
-        _joined([part.materials for part in parts]),
-    )
+    parts = [p._replace(faces=p.faces + start) for p, start in zip(parts, starts, strict=False)]
+    arrays: list[Any] = [_joined(each) for each in zip(*parts, strict=True)]
+    return MeshArrays(*arrays)
 
 
 def _checked_parts(parts: Iterable[MeshArrays], size: int, shown: str) -> Iterator[MeshArrays]:
@@ -84,7 +78,7 @@ def stated_up(file: Path) -> str | None:
     return "y" if suffix in GLTF else None
 
 
-def _joined(parts: list[NDArray[Any] | None]) -> NDArray[Any] | None:
+def _joined(parts: Sequence[NDArray[Any] | None]) -> NDArray[Any] | None:
     """Return rows of all parts, or None if one has none."""
     present = [part for part in parts if part is not None]
     return np.concatenate(present) if len(present) == len(parts) else None
@@ -193,17 +187,6 @@ def _usd_parts(geometry: Any, file: Path) -> Iterator[MeshArrays]:
             None if uv is None else uv * [1.0, -1.0] + [0.0, 1.0],
             faces,
         )
-
-
-def fans(counts: Whole) -> Whole:
-    """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
-
-    counts : corners of each polygon.
-    """
-    triangles = np.maximum(counts - 2, 0)
-    first = np.repeat(np.cumsum(counts) - counts, triangles)
-    step = np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
-    return np.stack([first, first + step + 1, first + step + 2], axis=-1).astype(np.int64)
 
 
 def _of_corners(values: Any, interpolation: str, corners: Whole, counts: Whole) -> Real | None:

@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Whole
 from ...errors import DiffractionError, counted, quoted
 from ...limits import check_content
 
-#: Formats of the content of a PLY file.
-FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
+# Formats of the content of a PLY file, and NumPy's codes of the order of their bytes
+_FORMATS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 # NumPy's codes of the types of a PLY file
 _CODES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
@@ -39,30 +40,25 @@ class Element(NamedTuple):
 
     Attributes
     ----------
-    name, number : `vertex`, `face` or others, and how many.
+    number : of such elements.
     properties : words of each line after `property`: type and name, or `list`, two types and name.
     """
 
-    name: str
     number: int
     properties: list[list[str]]
 
 
 class Header(NamedTuple):
-    """Header of a PLY file: its format, elements, and the place where its content begins."""
+    """Header of a PLY file: its format, elements by name, and where its content begins."""
 
     format: str
-    elements: list[Element]
+    elements: dict[str, Element]
     size: int
-
-    @property
-    def order(self) -> str:
-        """NumPy's code of the order of bytes in the content."""
-        return ">" if self.format == "binary_big_endian" else "<"
 
     def type_of(self, word: str) -> np.dtype[Any]:
         """Return the type of the numbers in the content that the file calls by this word."""
-        return np.dtype("<f8" if self.format == "ascii" else self.order + _CODES[word])
+        code = "f8" if self.format == "ascii" else _CODES[word]
+        return np.dtype(_FORMATS[self.format] + code)
 
     def row(self, element: Element, length: int) -> np.dtype[Any]:
         """Return the type of a row of an element in the content, whose lists have this length."""
@@ -90,21 +86,20 @@ class Header(NamedTuple):
                 raise DiffractionError(f"{shown}: its text is not all numbers") from error
 
 
-def check_mesh(file: Path, kind: str, number: int = 0, shown: str = "") -> None:
+def check_mesh(file: Path, kind: str, number: int = 0) -> None:
     """Refuse a mesh file that Mitsuba cannot read safely.
 
     kind : Mitsuba's plugin: `ply`, `serialized`, `obj`; others are not checked.
     number : of the mesh in a serialized file.
-    shown : the file in messages.
 
     Raises a DiffractionError if a triangle names a vertex that does not exist, the file is shorter
     than its header states, or it has no triangles: Dr.Jit compiles kernels for all meshes alive,
     and one without triangles would break every later rendering of the process.
     """
-    shown = shown or f"mesh '{file}'"
+    shown = f"mesh '{file}'"
     triangles = None
     if kind == "ply":
-        triangles = _check_ply(file, shown)
+        read_ply(file, shown)
     elif kind == "serialized":
         triangles = _check_serialized(file, number, shown)
     elif kind == "obj" and next(rests_of_lines(file, b"f"), None) is None:
@@ -121,16 +116,20 @@ def rests_of_lines(file: Path, word: bytes) -> Iterator[str]:
                 yield line[len(word) :].strip().decode("utf-8", "replace")
 
 
-def ply_header(file: Path, shown: str) -> Header | None:
-    """Return the header of a PLY file; None for other files.
+def ply_header(file: Path, shown: str) -> Header:
+    """Return the header of a PLY file.
 
-    Raises a DiffractionError if it has no end, or an element has no properties or an unknown type.
+    Raises a DiffractionError for other files, and if the header has no end, or an element has no
+    properties or an unknown type.
     """
     with file.open("rb") as stream:
         start = stream.read(_LONGEST_HEADER)
     if not re.match(rb"ply\s", start):
-        return None
-    form, elements = "", []
+        todo = f"run the command 'tangents {file} -o mesh.ply' first, and use mesh.ply"
+        if file.suffix.lower() not in (".obj", ".serialized"):
+            todo = "convert it to PLY or OBJ"
+        raise DiffractionError(f"{shown} is not a PLY, which is expected: {todo}")
+    form, elements = "", dict[str, Element]()
     end = re.search(rb"\nend_header[ \t\r]*\n", start)
     if end is None:
         raise DiffractionError(
@@ -141,11 +140,12 @@ def ply_header(file: Path, shown: str) -> Header | None:
         if words[:1] == ["format"] and len(words) > 1:
             form = words[1]
         elif words[:1] == ["element"]:
-            if len(words) < 3 or not words[2].isdecimal() or len(words[2]) > 18:
+            number = words[2] if len(words) > 2 else ""
+            if not number.isdecimal() or len(number) > 18 or words[1] in elements:
                 raise DiffractionError(
-                    f"{shown}: {quoted(line.strip())} cannot be an element of a PLY"
+                    f"{shown}: {quoted(line.strip())} cannot be an element, or is there twice"
                 )
-            elements.append(Element(words[1], int(words[2]), []))
+            elements[words[1]] = element = Element(int(number), [])
         elif words[:1] == ["property"]:
             types = words[2:4] if words[1:2] == ["list"] else words[1:2]
             expected = 5 if words[1:2] == ["list"] else 3
@@ -153,47 +153,95 @@ def ply_header(file: Path, shown: str) -> Header | None:
                 raise DiffractionError(
                     f"{shown}: {quoted(line.strip())} cannot be a property of a PLY"
                 )
-            elements[-1].properties.append(words[1:expected])
-    names = [element.name for element in elements]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise DiffractionError(f"{shown}: element {quoted(twice[0])} is there twice")
-    for element in elements:
+            element.properties.append(words[1:expected])
+    for name, element in elements.items():
         if element.number and not element.properties:
             raise DiffractionError(
-                f"{shown}: element {quoted(element.name)} has no properties, {element.number} times"
+                f"{shown}: element {quoted(name)} has no properties, {element.number} times"
             )
+    if form not in _FORMATS:
+        raise DiffractionError(f"{shown}: a PLY of format {quoted(form)} cannot be read")
     return Header(form, elements, end.end())
 
 
-def _check_ply(file: Path, shown: str) -> int | None:
-    """Return the number of triangles; None for what Mitsuba refuses, such as polygons."""
+def read_ply(file: Path, shown: str) -> tuple[dict[str, NDArray[Any]], NDArray[Any]]:
+    """Return numbers of a PLY file's vertices by name, and its triangles (m, 3).
+
+    Polygons are cut into fans, as Mitsuba cuts polygons of OBJ files.
+
+    Raises a DiffractionError if the file is no PLY, is damaged, or has no triangles.
+    """
     header = ply_header(file, shown)
-    if header is None:
-        return None
-    elements = {element.name: element for element in header.elements}
-    vertices, face = (elements.get(name, Element(name, 0, [])) for name in ("vertex", "face"))
-    if not vertices.number or not face.number:
-        return 0
-    content = header.content(file, shown)
-    if sum(e.number * header.row(e, 0).itemsize for e in header.elements) > len(content):
+    elements = header.elements
+    vertex, face = (elements.get(name, Element(0, [])) for name in ("vertex", "face"))
+    content, triangles = header.content(file, shown), np.empty((0, 3), np.int64)
+    try:
+        if vertex.number and face.number:
+            if sum(e.number * header.row(e, 0).itemsize for e in elements.values()) > len(content):
+                raise ValueError
+            # lists have three numbers, as Mitsuba expects
+            sizes = [e.number * header.row(e, 3).itemsize for e in elements.values()]
+            at = dict(zip(elements, np.cumsum([0, *sizes]).tolist(), strict=False))
+            triangles = _triangles(header, face, content, at["face"], vertex.number, shown)
+            rows = np.frombuffer(content, header.row(vertex, 3), vertex.number, at["vertex"])
+    except DiffractionError:
+        raise
+    except (ValueError, OverflowError, MemoryError) as error:
         raise DiffractionError(
-            f"{shown}: its {file.stat().st_size} bytes are fewer than its header states "
-            f"({vertices.number} vertices, {counted(face.number, 'face')}); export the mesh again"
-        )
-    before = header.elements[: header.elements.index(face)]
-    # lists have three numbers, as Mitsuba expects
-    start, row = sum(e.number * header.row(e, 3).itemsize for e in before), header.row(face, 3)
-    if start + face.number * row.itemsize > len(content):
-        return None  # no triangles alone, or too short
-    rows = np.frombuffer(content, row, face.number, start)
-    for n, words in enumerate(face.properties):
-        if words[0] != "list":
-            continue
-        if (rows[f"{n}"] != 3).any():
-            return None
-        if words[2] not in ("float", "float32", "double", "float64") or "vertex" in words[3]:
-            check_indices(rows[f"{n} values"], vertices.number, shown)
-    return face.number
+            f"{shown}: cannot be read: its {file.stat().st_size} bytes are not what its header "
+            f"states ({vertex.number} vertices, {counted(face.number, 'face')}); export it again"
+        ) from error
+    if not len(triangles):
+        raise DiffractionError(f"{shown}: it has no triangles")
+    return {words[-1]: rows[f"{n}"] for n, words in enumerate(vertex.properties)}, triangles
+
+
+def _triangles(
+    header: Header, face: Element, content: NDArray[np.uint8], at: int, vertices: int, shown: str
+) -> NDArray[Any]:
+    """Return the triangles (m, 3) of faces whose rows begin at a byte of the content.
+
+    Raises a DiffractionError if one names no vertex, a ValueError if the content is too short.
+    """
+    lists = {n: words for n, words in enumerate(face.properties) if words[0] == "list"}
+    named = [n for n, words in lists.items() if words[3] in ("vertex_indices", "vertex_index")]
+    row = header.row(face, 3)
+    if at + face.number * row.itemsize <= len(content):
+        rows = np.frombuffer(content, row, face.number, at)
+        if all((rows[f"{n}"] == 3).all() for n in lists):
+            for n, words in lists.items():
+                if n in named or not words[2].startswith(("float", "double")):
+                    check_indices(rows[f"{n} values"], vertices, shown)
+            return np.asarray(rows[f"{named[-1]} values"]) if named else np.empty((0, 3), np.int64)
+    counts, polygons = [], []
+    for _ in range(face.number):
+        for n, words in enumerate(face.properties):
+            size = 1
+            if n in lists:
+                kind = header.type_of(words[1])
+                size = int(np.frombuffer(content, kind, 1, at)[0])
+                at += kind.itemsize
+            kind = header.type_of(words[-2])
+            if size < 0:
+                raise ValueError
+            if n in named:
+                counts.append(size)
+                polygons.append(np.frombuffer(content, kind, size, at))
+            at += size * kind.itemsize
+    corners = np.concatenate(polygons)
+    check_indices(corners, vertices, shown)
+    return np.asarray(corners[fans(np.array(counts))])
+
+
+def fans(counts: Whole) -> Whole:
+    """Return the triangles (m, 3) of polygons, by the numbers of their corners in a row.
+
+    counts : corners of each polygon.
+    """
+    triangles = np.maximum(counts - 2, 0)
+    first = np.repeat(np.cumsum(counts) - counts, triangles)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return np.stack([first, first + step + 1, first + step + 2], axis=-1).astype(np.int64)
 
 
 def check_indices(corners: NDArray[Any], vertices: int, shown: str) -> None:

@@ -22,7 +22,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ...arrays import Real, Whole
 from ..elements import ORIENTATION
-from .trimesh import TriangleMesh, texture_tangents, unit
+from .trimesh import TriangleMesh, across, texture_tangents, turned, unit
 
 Bools = NDArray[np.bool_]
 
@@ -74,23 +74,14 @@ def _length_of_breaks(places: Real, faces: Whole, crossed: Bools, jumps: Whole) 
     size = float(np.ptp(places[faces].reshape(-1, 3), axis=0).max())
     line = extent > np.minimum(_EDGES * longest, _SHARE * size)
 
-    length = np.zeros(len(edges))
-    within = int(crossed.sum())
-    length[within:] = sizes[within:]
-    length[:within] = _shares(places[faces], crossed, middles[:within])
+    # in a triangle each crossed edge has the way from its middle to where the line's parts meet
+    corners = places[faces]
+    halves = (corners + np.roll(corners, -1, axis=1)) / 2
+    paired = crossed.sum(axis=1, keepdims=True) == 2
+    meeting = np.where(paired, (halves * crossed[..., None]).sum(axis=1) / 2, corners.mean(axis=1))
+    within = np.linalg.norm(halves - meeting[:, None], axis=2)[crossed]
+    length = np.concatenate([within, sizes[len(within) :]])
     return float(length[line[part]].sum())
-
-
-def _shares(corners: Real, crossed: Bools, middles: Real) -> Real:
-    """Length of the line in a triangle that falls to each of its crossed edges."""
-    owner = np.nonzero(crossed)[0]
-    meeting = corners.mean(axis=1)
-    paired = crossed.sum(axis=1) == 2
-    total = np.zeros_like(meeting)
-    np.add.at(total, owner, middles)
-    # from both middles half-way to each other
-    meeting[paired] = total[paired] / 2
-    return np.asarray(np.linalg.norm(middles - meeting[owner], axis=1))
 
 
 @dataclass(frozen=True)
@@ -149,26 +140,20 @@ class TangentReport:
                 f"{self.degenerate:.0%} of the surface has texture coordinates without area, hence "
                 "no tangent: unwrap those parts"
             )
+        remedy = "unwrap along the body in one piece"
+        if self.has_orientation:
+            remedy = "choose another guide of the command 'tangents', --along smooth or body"
         if self.breaks:
             lines.append(
-                f"the patch's direction {self.breaking()}: colours will show seams; "
-                + (
-                    "make it with the command 'tangents' along another guide"
-                    if self.has_orientation
-                    else "unwrap along the body in one piece"
-                )
+                f"the patch's direction {self.breaking()}: colours will show seams; {remedy}"
             )
         if self.turns_fast:
             lines.append(
                 f"the patch's direction turns by over {TURN:g} degrees between neighbours, or "
-                f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: "
-                + (
-                    "use a finer mesh, or the command 'tangents' along another guide"
-                    if self.has_orientation
-                    else "colours will show seams; unwrap along the body in one piece"
-                )
+                f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: colours will "
+                f"show seams; use a finer mesh, or {remedy}"
             )
-        if self.mirrored > MOST_MIRRORED:
+        if self.mirrored > MOST_MIRRORED and not self.has_orientation:
             lines.append(
                 f"texture coordinates on {self.mirrored:.0%} of the surface are mirrored against "
                 "the rest, where u may run the other way, and the patch with it: flip those parts"
@@ -177,16 +162,11 @@ class TangentReport:
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers and strings, for printing."""
+        direction = f"dp/du turned by {ORIENTATION}" if self.has_orientation else "dp/du"
         return {
             "triangles": self.triangles,
             "texture coordinates": self.has_uv,
-            "direction of the patch": (
-                "none"
-                if not self.has_uv
-                else f"dp/du turned by {ORIENTATION}"
-                if self.has_orientation
-                else "dp/du"
-            ),
+            "direction of the patch": direction if self.has_uv else "none",
             "shares of the surface area, 0 to 1": {
                 "without tangent": self.degenerate,
                 "mirrored": self.mirrored,
@@ -206,10 +186,10 @@ def check_tangents(mesh: TriangleMesh) -> TangentReport:
     """Judge the direction of a patch on a mesh, as Mitsuba will compute it."""
     positions, faces, uv = mesh.positions, mesh.faces, mesh.uv
     sides = positions[faces[:, 1:]] - positions[faces[:, :1]]  # (m, 2, 3)
-    across = np.cross(sides[:, 0], sides[:, 1])
-    area = np.linalg.norm(across, axis=1) / 2
+    front = across(positions[faces])
+    area = np.linalg.norm(front, axis=1) / 2
     solid = area > 0
-    faces, sides, across, area = faces[solid], sides[solid], across[solid], area[solid]
+    faces, sides, front, area = faces[solid], sides[solid], front[solid], area[solid]
     total = area.sum()
     if uv is None or not len(faces):
         return TangentReport(len(faces), uv is not None, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -222,7 +202,7 @@ def check_tangents(mesh: TriangleMesh) -> TangentReport:
     good = ~flat
     tangent = np.where(good[:, None], unit(dp_du), 0.0)
 
-    front = across / (2 * area[:, None])
+    front /= 2 * area[:, None]
     front *= np.where((front * outward).sum(axis=1) < 0, -1.0, 1.0)[:, None]
     turn = mesh.orientation
     if turn is None:
@@ -289,7 +269,7 @@ def _jumps(
     cosine = np.full(len(first), -1.0)
     for end in (0, 1):  # it must jump at both, or it is the turn within a triangle
         ways = [
-            _laid(tangent[face], normals[face], ends[at, end])
+            turned(tangent[face], normals[face], unit(ends[at, end]))
             for face, at in ((this, first), (other, first + 1))
         ]
         laid_over = carried(ways[0], normals[this], normals[other])  # a fold alone is no turn
@@ -298,9 +278,3 @@ def _jumps(
     jump = cosine < np.cos(np.radians(TURN))
     marked[this[jump]] = marked[other[jump]] = True
     return marked, edges[first[cosine < np.cos(np.radians(BREAK))]]
-
-
-def _laid(tangent: Real, normal: Real, turn: Real) -> Real:
-    """Turn unit tangents (n, 3) by (cosine, sine) (n, 2), counter-clockwise around normals."""
-    cosine, sine = np.split(unit(turn), 2, axis=-1)
-    return cosine * tangent + sine * np.cross(normal, tangent)

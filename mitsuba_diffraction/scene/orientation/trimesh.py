@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Real, Whole
-from ...errors import DiffractionError
+from ...errors import DiffractionError, counted
 
 #: Angle (rad) between the sides of an edge from which on it is sharp, if the sides have vertices of
 #: their own there, as a box has where its texture is cut.
@@ -18,18 +19,48 @@ CREASE = math.radians(60.0)
 _MOST_AT_ONE_PLACE = 64
 
 
+class MeshArrays(NamedTuple):
+    """Arrays of a triangle mesh as a file has them.
+
+    Attributes
+    ----------
+    positions, normals : (n, 3); normals may be absent.
+    uv : (n, 2) texture coordinates, or None.
+    faces : (m, 3) indices of vertices.
+    orientation : (n, 2) first channels of the attribute vertex_orientation, or None.
+    materials : (m,) number of each triangle's material in a glTF file, or None.
+    """
+
+    positions: Real
+    normals: Real | None
+    uv: Real | None
+    faces: Whole
+    orientation: Real | None = None
+    materials: Whole | None = None
+
+
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Vertices with normals and mostly texture coordinates, and the triangles between them."""
+    """Vertices with normals and mostly texture coordinates, and the triangles between them.
 
-    # positions, normals: (n, 3) floats; normals are unit vectors
+    Attributes
+    ----------
+    positions, normals : (n, 3); normals are unit vectors.
+    uv : (n, 2) texture coordinates, or None; dp/du is the first tangent, which a patch follows.
+    faces : (m, 3) indices of vertices, counter-clockwise seen from outside.
+    orientation : (n, 2) cosine and sine of the angle by which the patch is turned away from dp/du,
+        or None.
+    own_normals : whether its file holds the normals; otherwise `vertex_normals` has made them.
+    materials : (m,) number of each triangle's material in a glTF file; None for other files.
+    """
+
     positions: Real
     normals: Real
-    uv: Real | None  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
-    faces: Whole  # (m, 3) integers, counter-clockwise seen from outside
-    # (n, 2) floats or None Cosine and sine of the angle by which the patch is turned away from
-    # dp/du
+    uv: Real | None
+    faces: Whole
     orientation: Real | None = None
+    own_normals: bool = True
+    materials: Whole | None = None
 
     def __post_init__(self) -> None:
         n = len(self.positions)
@@ -49,8 +80,11 @@ class TriangleMesh:
         """Return the mesh of some triangles, (m,), with their vertices alone."""
         kept, faces = np.unique(self.faces[chosen], return_inverse=True)
         uv, turns = (None if a is None else a[kept] for a in (self.uv, self.orientation))
-        positions, normals = self.positions[kept], self.normals[kept]
-        return TriangleMesh(positions, normals, uv, faces.reshape(-1, 3), turns)
+        return replace(
+            self, positions=self.positions[kept], normals=self.normals[kept], uv=uv,
+            faces=faces.reshape(-1, 3), orientation=turns,
+            materials=None if self.materials is None else self.materials[chosen],
+        )  # fmt: skip
 
 
 def cell_corners(grid: Whole) -> tuple[Whole, ...]:
@@ -190,6 +224,25 @@ def _unrolled(corners: Real, normals: Real, wanted: Real) -> tuple[Real, Real]:
 def tangential(vectors: Real, normals: Real) -> Real:
     """Unit vectors along the part of `vectors` at right angles to `normals`; zero stays zero."""
     return unit(vectors - (vectors * normals).sum(axis=-1, keepdims=True) * normals)
+
+
+def turned(directions: Real, normals: Real, turn: Real) -> Real:
+    """Turn tangents (n, 3) around unit normals, counter-clockwise seen from outside.
+
+    turn : (n, 2) or (2,) cosine and sine of the angle.
+    """
+    cosine, sine = np.split(turn, 2, axis=-1)
+    return cosine * directions + sine * np.cross(normals, directions)
+
+
+def check_finite(vertices: Real, shown: str) -> None:
+    """Raise a DiffractionError if a row (n, …) of vertices is not finite."""
+    lost = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(lost):
+        count = counted(len(lost), "such vertex", "such vertices")
+        raise DiffractionError(
+            f"{shown}: vertex {lost[0]} is not finite ({count}); repair the mesh"
+        )
 
 
 def unit(vectors: Real) -> Real:

@@ -110,8 +110,8 @@ def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
         raise DiffractionError(
             f"the heights of {surfaces} are an array, which no recipe can name; save them to a file"
         )
-    default = TableSettings(coherence=settings.coherence, basis=settings.basis)
     values = {name: getattr(settings, name) for name in RECIPE_SETTINGS}
+    default = TableSettings()
     table = {name: value for name, value in values.items() if value != getattr(default, name)}
     comment = (
         f"Planned for {surfaces} in {scene}: at most {100 * planned.outside:.2g} % of the light\n"
@@ -134,12 +134,7 @@ def load_limited(load: Load, planned: Sequence[PlannedTable]) -> Any:
         for each in planned
         if each.settings is not None
     }
-
-    def table_of(request: TableRequest) -> DiffractionTable:
-        key = request.digest, request.settings
-        return request.cached(limited.get(key, request.settings))
-
-    with providing(table_of):
+    with providing(lambda r: r.cached(limited.get((r.digest, r.settings), r.settings))):
         return load()
 
 

@@ -34,8 +34,8 @@ def test_scenes_that_do_not_load_are_one_line(run, scene, old, new, said):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.obj", "# of a modeller\nv 0 0 0\n", "tangents a.obj -o mesh.ply' first"),
-        ("a.stl", "solid a\n", "'a.stl' is not a PLY mesh, which the scene expects: convert it"),
+        ("a.obj", "# of a modeller\nv 0 0 0\n", "a.obj -o mesh.ply' first"),
+        ("a.stl", "solid a\n", "a.stl' is not a PLY, which is expected: convert it"),
         ("a.ply", "ply\n#\n", "/a.ply' is a damaged PLY"),
     ],
 )  # fmt: skip

@@ -16,7 +16,7 @@ from PIL import EpsImagePlugin, Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.fitted_mesh import fit_of
-from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh, read_mesh
+from mitsuba_diffraction.scene.orientation.mesh_files import load_mesh
 from mitsuba_diffraction.scene.orientation.trimesh import grid_faces
 from tests.support.hostile import postscript
 from tests.support.meshes import obj_of, ply_text
@@ -75,8 +75,7 @@ def test_a_mesh_comes_placed_with_normals_and_coordinates(
 ) -> None:
     file = tmp_path / f"sheet{suffix}"
     write(file)
-    read = read_mesh(file)
-    mesh = read.mesh
+    mesh = load_mesh(file)
     assert mesh.uv is not None
     u = mesh.uv[:, 0]
     v = 1.0 - mesh.uv[:, 1]  # Mitsuba's v runs downwards
@@ -91,7 +90,7 @@ def test_a_mesh_comes_placed_with_normals_and_coordinates(
     assert (np.sum(area * mesh.normals[mesh.faces[:, 0]], axis=1) > 0.0).all()
     # the whole sheet, each part once
     np.testing.assert_allclose(np.abs(area[:, 2]).sum() / 2.0, 4.0, rtol=1e-5)
-    assert read.own_normals
+    assert mesh.own_normals
 
 
 @pytest.mark.parametrize(("write", "suffix"), WRITERS[::2])
@@ -173,8 +172,8 @@ def test_meshes_without_normals_get_smooth_ones(
         pytest.importorskip("pxr.Usd")
     file = tmp_path / f"cube{suffix}"
     write_cube(file)
-    mesh, own = read_mesh(file)[1:3]
-    assert not own
+    mesh = load_mesh(file)
+    assert not mesh.own_normals
     np.testing.assert_allclose(mesh.normals, mesh.positions / np.sqrt(3.0), atol=1e-6)
 
 

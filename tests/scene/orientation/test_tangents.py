@@ -76,6 +76,9 @@ def test_a_mirrored_half_is_named() -> None:
     report = check_tangents(TriangleMesh(positions, normals, uv, faces))
     assert report.mirrored == pytest.approx(0.5)
     assert any("mirrored" in line for line in report.problems())
+    # an orientation is an angle around the normal, in which v has no part
+    turns = np.tile([1.0, 0.0], (len(uv), 1))
+    assert not check_tangents(TriangleMesh(positions, normals, uv, faces, turns)).problems()
 
 
 def test_coordinates_that_are_mirrored_everywhere_are_no_problem() -> None:

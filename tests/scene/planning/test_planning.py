@@ -239,8 +239,9 @@ def test_a_scene_is_loaded_with_the_limits_of_its_plan(lit):
     assert not other.limited
 
 
-def test_a_recipe_builds_the_planned_table_again(file, tmp_path):
-    (light,) = light_of_tables(lambda: from_file(file), sensor, PATHS)
+@pytest.mark.parametrize("coherence", ["ensemble", "patch"])
+def test_a_recipe_builds_the_planned_table_again(file, tmp_path, coherence):
+    (light,) = light_of_tables(lambda: from_file(file, coherence=coherence), sensor, PATHS)
     planned = plan_table(light, 1e-3)
     (output,) = recipe_files(tmp_path / "foil.toml", 1)
     recipe, comment = recipe_of(planned, "plate.xml")
@@ -249,7 +250,8 @@ def test_a_recipe_builds_the_planned_table_again(file, tmp_path):
     built = md.DiffractionTable.build(md.HeightField.load(output), **again.table)
     np.testing.assert_array_equal(built.coefficients, planned.table.coefficients)
     assert built.frequency_limit == planned.table.frequency_limit
-    (table,) = tables_of(load_by_recipes(lambda: from_file(file), [output]))
+    (table,) = tables_of(load_by_recipes(lambda: from_file(file, coherence=coherence), [output]))
+    assert table.coherence == coherence
     assert table.digest() == planned.table.digest()
 
 
