@@ -147,14 +147,37 @@ def require_llvm() -> None:
     Raises a DiffractionError if it cannot, with the versions found, the versions supported, and how
     to install one.
     """
-    named = named_library()
-    if "drjit" in sys.modules:
-        _require_loaded(named)
-    elif named is not None:
-        if fault := _fault_of(named):
-            raise DiffractionError(_bad_choice(named, fault))
-    elif _best() is None:
-        raise DiffractionError(_nothing_usable())
+    named, best, version = named_library(), _best(), loaded_llvm_version()
+    if version is not None and version[0] >= OLDEST:
+        return
+    loaded = "drjit" in sys.modules
+    if named is not None and (version is None or named.version in (None, version[0])):
+        fault = _too_old(version[0]) if version else _fault_of(named)
+        if loaded or fault:
+            other = _best(apart_from=named)
+            remedy = (
+                f"set it to {other.path}, or unset it" if other else f"unset it, and {_install()}"
+            )
+            raise DiffractionError(
+                f'{VARIABLE}="{os.environ[VARIABLE]}": {fault or "Dr.Jit cannot load it"}; {remedy}'
+            )
+    elif best is None:
+        libraries = ", ".join(str(library) for library in find_llvm()) or "none"
+        raise DiffractionError(
+            f"there is no LLVM that Dr.Jit can use; found: {libraries}; usable: {OLDEST} or newer, "
+            f"best {TESTED}; {_install()}"
+        )
+    elif loaded:
+        number = ".".join(map(str, version or ()))
+        what = (
+            "found no LLVM"
+            if version is None
+            else f"loaded LLVM {number}, which would end the process"
+        )
+        raise DiffractionError(
+            f"Dr.Jit has {what}; import mitsuba_diffraction before mitsuba and drjit, or start "
+            f"again with {VARIABLE}={best.path}"
+        )
 
 
 def require_loaded_llvm() -> None:
@@ -162,24 +185,7 @@ def require_loaded_llvm() -> None:
     import mitsuba as mi
 
     if (mi.variant() or "").startswith("llvm"):
-        _require_loaded(named_library())
-
-
-def _require_loaded(named: Library | None) -> None:
-    version = loaded_llvm_version()
-    if version is not None and version[0] >= OLDEST:
-        return
-    if named is not None and (version is None or named.version in (None, version[0])):
-        fault = _too_old(version[0]) if version else _fault_of(named)
-        raise DiffractionError(_bad_choice(named, fault or "Dr.Jit cannot load it"))
-    if version is None:
-        raise DiffractionError(
-            f"Dr.Jit has found no LLVM; {_start_again()}" if _best() else _nothing_usable()
-        )
-    number = ".".join(map(str, version))
-    raise DiffractionError(
-        f"Dr.Jit has loaded LLVM {number}, which would end the process; {_start_again()}"
-    )
+        require_llvm()
 
 
 def _best(apart_from: Library | None = None) -> Library | None:
@@ -196,35 +202,8 @@ def _fault_of(library: Library) -> str | None:
     return None
 
 
-# ------------------------------------------------------------------------------- messages
-
-
 def _too_old(version: int) -> str:
     return f"LLVM {version} cannot compile the kernels of Dr.Jit"
-
-
-def _bad_choice(named: Library, fault: str) -> str:
-    best = _best(apart_from=named)
-    remedy = f"set it to {best.path}, or unset it" if best else f"unset it, and {_install()}"
-    return f'{VARIABLE}="{os.environ.get(VARIABLE)}": {fault}; {remedy}'
-
-
-def _start_again() -> str:
-    best = _best()
-    if best is None:
-        return _install()
-    return (
-        "import mitsuba_diffraction before mitsuba and drjit, "
-        f"or start again with {VARIABLE}={best.path}"
-    )
-
-
-def _nothing_usable() -> str:
-    libraries = ", ".join(str(library) for library in find_llvm()) or "none"
-    return (
-        f"there is no LLVM that Dr.Jit can use; found: {libraries}; usable: {OLDEST} or newer, "
-        f"best {TESTED}; {_install()}"
-    )
 
 
 def _install() -> str:
