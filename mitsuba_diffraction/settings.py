@@ -93,7 +93,9 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _among(*choices: str) -> Callable[[Any], str]:
+def among(*choices: str) -> Callable[[Any], str]:
+    """Return a check for one of these words."""
+
     def check(value: Any) -> str:
         if not isinstance(value, str) or value not in choices:
             raise ValueError
@@ -145,7 +147,7 @@ def _half_axes(value: Any) -> tuple[float, float]:
 
 
 def _choices(*names: str) -> dict[str, Any]:
-    return {"check": _among(*names), "must": f"one of {', '.join(names)}", "choices": names}
+    return {"check": among(*names), "must": f"one of {', '.join(names)}", "choices": names}
 
 
 @dataclass(frozen=True)

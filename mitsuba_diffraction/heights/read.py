@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 from ..errors import DiffractionError, warn
 from ..files import FileKind, beginning, kind_of, readable_file
 from ..retired import retired_value
-from ..settings import parameter, parameters_of
+from ..settings import among, parameter, parameters_of
 from . import preprocess
 from .field import LARGE, HeightField
 from .formats import RawHeights
@@ -31,7 +30,7 @@ from .lengths import (
     height_unit_of,
     is_auto,
     micrometres_of,
-    numbers_of,
+    numbers_within,
     pixel_size_of,
 )
 from .validity import tilted
@@ -60,26 +59,15 @@ def _choices(*choices: str, alone: str = "", metavar: str = "METHOD") -> dict[st
 
     alone : what to say before the choices.
     """
-
-    def check(value: object) -> str | None:
-        if value is None or is_auto(value):
-            return None
-        if not isinstance(value, str) or value not in choices:
-            raise ValueError
-        return value
-
-    must = f"{alone}one of {', '.join(map(repr, ('auto', *choices)))}"
-    return {"check": check, "must": must, "metavar": metavar}
+    check, must = among(*choices), f"{alone}one of {', '.join(map(repr, ('auto', *choices)))}"
+    return {"check": lambda v: None if is_auto(v) else check(v), "must": must, "metavar": metavar}
 
 
 def _sigmas(value: object) -> float | None:
     """Check the number of standard deviations to keep: a number or numeric string from 1 on."""
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
-    sigmas = numbers_of(value) if isinstance(value, str | numbers.Real) else None
-    if sigmas is None or len(sigmas) != 1 or sigmas[0] < 1.0:
-        raise ValueError
-    return sigmas[0]
+    return numbers_within(value, (1,), 1.0, math.inf)[0]
 
 
 @dataclass(frozen=True)

@@ -172,11 +172,7 @@ def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any
     if not isinstance(arguments, dict):
         raise DiffractionError(f"{shown}: arguments: expected a table [arguments]")
     parameters = inspect.signature(getattr(gratings, name)).parameters
-    for key in arguments:
-        if key not in parameters:
-            raise DiffractionError(
-                f"{shown}: [arguments]: {name!r} has no {key!r}; it has {', '.join(parameters)}"
-            )
+    check_keys(f"{shown}: [arguments] of {name!r}", arguments, [*parameters])
     for key, parameter in parameters.items():
         if parameter.default is parameter.empty and key not in arguments:
             raise DiffractionError(f"{shown}: [arguments]: {name!r} needs {key!r}")
