@@ -85,7 +85,7 @@ def files_of(
 
     with_sources : whether recipes are read, for the files that they name.
     """
-    from ..heights import Recipe
+    from ..heights import Source
 
     files: dict[Path, None] = {}
     waiting = [scene]
@@ -109,7 +109,7 @@ def files_of(
         files[file] = None
         waiting += named_files(file)
         if with_sources and kind_of(file) is FileKind.RECIPE:
-            waiting += Recipe.load(file).sources
+            waiting += Source.of(file).files
     return list(files)
 
 
