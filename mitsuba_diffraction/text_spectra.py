@@ -165,13 +165,13 @@ def _share_unit(choice: Choice, table: Columns, inside: Real, what: str) -> floa
 def _in_nm(values: Real, unit: str, shown: str) -> Real:
     """Return wavelengths in nm; a unit that makes no light of them is overruled aloud."""
     stated = WAVELENGTH_UNITS.get(unit.lower(), WAVELENGTH_UNITS.get(unit.lower().rstrip("s")))
-    guesses = {name: WAVELENGTH_UNITS[name] for name in ("nm", "µm")}
-    for factor in ([stated] if stated else []) + [1.0, 1e3]:
+    for name, factor in ((unit, stated), ("nm", 1.0), ("µm", 1e3)):
+        if factor is None:
+            continue
         lam = values * factor
         if not (_LIGHT[0] <= lam.min() and lam.max() <= _LIGHT[1]):
             continue
         if factor != (stated or 1.0):
-            name = next(name for name, its in guesses.items() if its == factor)
             says = f"its header says {unit}" if stated else "its header has no unit"
             warn(
                 f"{shown}: wavelengths {values.min():g} to {values.max():g} are read as {name}; "
