@@ -54,14 +54,6 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
     return lengths[0], lengths[-1]
 
 
-def height_of(value: Height | None) -> float | None:
-    """Return a height in µm, above 0, from a number or numeric string; `None` for "auto".
-
-    Raises a ValueError for other values, as the other checks below.
-    """
-    return None if is_auto(value) else numbers_within(value, (1,), 5e-324, LONGEST_HEIGHT)[0]
-
-
 def micrometres_of(unit: str) -> float | None:
     """Return how many µm one `unit` of length is, or `None` if the unit is unknown."""
     name = unicodedata.normalize("NFKC", unit.strip())
@@ -69,7 +61,10 @@ def micrometres_of(unit: str) -> float | None:
 
 
 def height_unit_of(value: str | None) -> str | None:
-    """Check a unit of length; `None` and "auto" give `None`: the file has to state it."""
+    """Check a unit of length; `None` and "auto" give `None`: the file has to state it.
+
+    Raises a ValueError for other values, as the other checks below.
+    """
     if is_auto(value):
         return None
     if not isinstance(value, str) or micrometres_of(value) is None:
@@ -82,7 +77,7 @@ def crop_of(value: Crop | None) -> tuple[float, ...] | None:
 
     `None` and "none" give `None`: no crop.
     """
-    if value is None or (isinstance(value, str) and value.strip() == "none"):
+    if is_auto(value, "none"):
         return None
     lengths = numbers_within(value, (1, 2, 4), 0.0, math.inf)
     if not min(lengths[:2]) > 0.0:
@@ -90,9 +85,9 @@ def crop_of(value: Crop | None) -> tuple[float, ...] | None:
     return lengths if len(lengths) > 1 else (lengths[0], lengths[0])
 
 
-def is_auto(value: object) -> bool:
-    """Return whether a value is `None` or "auto": the file has to state it."""
-    return value is None or (isinstance(value, str) and value.strip().lower() == "auto")
+def is_auto(value: object, word: str = "auto") -> bool:
+    """Return whether a value is `None` or the word: with "auto" the file has to state it."""
+    return value is None or (isinstance(value, str) and value.strip().lower() == word)
 
 
 def numbers_of(value: object) -> tuple[float, ...] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,6 @@ from .lengths import (
     LONGEST_PIXEL,
     SHORTEST_PIXEL,
     crop_of,
-    height_of,
     height_unit_of,
     is_auto,
     micrometres_of,
@@ -63,11 +63,9 @@ def _choices(*choices: str, alone: str = "", metavar: str = "METHOD") -> dict[st
     return {"check": lambda v: None if is_auto(v) else check(v), "must": must, "metavar": metavar}
 
 
-def _sigmas(value: object) -> float | None:
-    """Check the number of standard deviations to keep: a number or numeric string from 1 on."""
-    if value is None or (isinstance(value, str) and value.strip() == "none"):
-        return None
-    return numbers_within(value, (1,), 1.0, math.inf)[0]
+def _number(word: str, least: float, most: float) -> Callable[[Any], float | None]:
+    """Return a check for a number or numeric string; None and the word give None."""
+    return lambda v: None if is_auto(v, word) else numbers_within(v, (1,), least, most)[0]
 
 
 @dataclass(frozen=True)
@@ -79,8 +77,9 @@ class LoadOptions:
         metavar="DX[,DY]",
     )  # fmt: skip
     max_height: float | None = parameter(
-        None, height_of, "µm, height of white in an image; other heights are scaled to span it "
-        "from end to end", f"a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'", "H",
+        None, _number("auto", 5e-324, LONGEST_HEIGHT),
+        "µm, height of white in an image; other heights are scaled to span it from end to end",
+        f"a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'", "H",
     )  # fmt: skip
     height_unit: str | None = parameter(
         None, height_unit_of, "unit of the numbers in the file, e.g. nm; overrides what it states",
@@ -105,7 +104,8 @@ class LoadOptions:
         **_choices("none", *LEVELS, alone="one surface (HeightField.treated subtracts another), "),
     )  # fmt: skip
     clip: float | None = parameter(
-        None, _sigmas, "clip heights beyond N robust standard deviations (dust)",
+        None, _number("none", 1.0, math.inf),
+        "clip heights beyond N robust standard deviations (dust)",
         "the number of standard deviations to keep, at least 1", "N",
     )  # fmt: skip
     periodic: str | None = parameter(
