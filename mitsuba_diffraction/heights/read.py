@@ -77,7 +77,7 @@ class LoadOptions:
         metavar="DX[,DY]",
     )  # fmt: skip
     max_height: float | None = parameter(
-        None, _number("auto", 5e-324, LONGEST_HEIGHT),
+        None, _number("auto", math.ulp(0.0), LONGEST_HEIGHT),
         "µm, height of white in an image; other heights are scaled to span it from end to end",
         f"a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'", "H",
     )  # fmt: skip
