@@ -132,15 +132,31 @@ def _harmonic(start: Real, missing: npt.NDArray[np.bool_]) -> Real:
     The five-point Laplacian with free edges is symmetric and, with a measured point anywhere,
     positive definite; iterations grow with the width of the gaps, not with their number.
     """
-    grid = scipy.sparse.linalg.LaplacianNd(missing.shape, boundary_conditions="neumann")
-    rows = -grid.tosparse().tocsr()[missing.ravel()].astype(np.float64)
-    laplacian = rows[:, missing.ravel()]
-    measured = -(rows @ np.where(missing, 0.0, start).ravel())
+    rows, columns = np.nonzero(missing)
+    ny, nx = missing.shape
+    count = rows.size
+    index = np.full(missing.shape, -1)
+    index[missing] = np.arange(count)
+    degree, measured = np.zeros(count), np.zeros(count)
+    links = []  # pairs of neighbouring missing points
+    for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        r, c = rows + down, columns + right
+        inside = np.nonzero((r >= 0) & (r < ny) & (c >= 0) & (c < nx))[0]
+        degree[inside] += 1
+        r, c = r[inside], c[inside]
+        known = ~missing[r, c]
+        measured[inside[known]] += start[r[known], c[known]]
+        links.append((inside[~known], index[r[~known], c[~known]]))
+    point, neighbour = (np.concatenate(ends) for ends in zip(*links, strict=True))
+    adjacency = scipy.sparse.coo_array(
+        (np.ones(point.size), (point, neighbour)), shape=(count, count)
+    )
+    laplacian = (scipy.sparse.diags_array(degree) - adjacency).tocsr()
     if not np.any(laplacian @ start[missing] - measured):
         return start  # conjugate gradients would divide by this residual of 0
     # rtol: heights are stored as float32 at best, 1e-7 of their size; 1e-9 is well below that
     solution, failed = scipy.sparse.linalg.cg(
-        laplacian, measured, x0=start[missing], rtol=1e-9, maxiter=10 * sum(missing.shape)
+        laplacian, measured, x0=start[missing], rtol=1e-9, maxiter=10 * (ny + nx)
     )
     if failed:
         raise DiffractionError("fill: the gaps are too wide for 'harmonic'; use 'nearest'")
