@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.columns import read_columns
+from mitsuba_diffraction.columns import read_columns, save_rows
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.text_spectra import choice_of, read_shares, read_spectra
 
@@ -140,3 +140,10 @@ def test_bytes_are_no_text(tmp_path):
     file.write_bytes(np.random.default_rng(0).bytes(4000))
     with pytest.raises(DiffractionError, match="export it as text"):
         read_columns(file)
+
+
+def test_names_of_columns_may_hold_the_separator(tmp_path):
+    save_rows(tmp_path / "a.csv", ["wl", "back, male"], np.array([[500.0, 0.25], [510.0, 0.5]]))
+    read = read_columns(tmp_path / "a.csv")
+    assert read.names == ("wl", "back, male")
+    assert np.array_equal(read.numbers, [[500.0, 0.25], [510.0, 0.5]])
