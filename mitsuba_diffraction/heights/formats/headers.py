@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 from ...files import tiff_tags
 from ..lengths import micrometres_of
@@ -103,20 +104,15 @@ def _gwyddion(path: Path, head: bytes) -> Iterator[Stated]:
 
 def _x3p(path: Path, head: bytes) -> Iterator[Stated]:
     """`Increment`, m, of CX and CY times the size of the matrix (ISO 25178-72)."""
-    with zipfile.ZipFile(path) as archive:
-        text = archive.open("main.xml").read(_HEADER)
-
-    def value(*tags: str) -> float:
-        at = 0
-        for tag in tags:
-            match = re.compile(rf"<(?:\w+:)?{tag}>\s*([^<\s]*)".encode()).search(text, at)
-            if match is None:
-                raise ValueError
-            at = match.end()
-        return float(match[1]) if match else 0.0
-
-    width, height = (value(f"C{n}", "Increment") * value(f"Size{n}") * 1e6 for n in "XY")
-    yield Stated(width, height)
+    with zipfile.ZipFile(path) as archive, archive.open("main.xml") as stream:
+        root = ElementTree.parse(stream).getroot()
+    x, y = (
+        float(root.findtext(f".//{{*}}C{n}/{{*}}Increment", ""))
+        * float(root.findtext(f".//{{*}}Size{n}", ""))
+        * 1e6
+        for n in "XY"
+    )
+    yield Stated(x, y)
 
 
 def _sdf(path: Path, head: bytes) -> Iterator[Stated]:
