@@ -199,13 +199,13 @@ def read_bytes(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> byt
         raise DiffractionError(f"cannot read {str(file)!r}: {error.strerror}") from error
 
 
-def read_text(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> str:
-    """Return the content of a text file in UTF-8 of at most `largest` bytes.
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Return the content of a text file in UTF-8 of at most `LARGEST_TEXT` bytes.
 
     Raises a DiffractionError as `readable_file` does, or if the file is larger, or not text.
     """
     try:
-        return read_bytes(path, largest).decode("utf-8")
+        return read_bytes(path, LARGEST_TEXT).decode("utf-8")
     except UnicodeDecodeError as error:
         raise DiffractionError(f"{os.fspath(path)!r} is not text (UTF-8)") from error
 

@@ -124,9 +124,9 @@ def seen_slope(field: HeightField, shortest: float) -> float:
     return field.rms_slope * math.sqrt(seen / total) if total > 0.0 else field.rms_slope
 
 
-def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
+def dominant_periods(field: HeightField) -> list[Periodicity]:
     """Return the gratings of `examine_periods`."""
-    return examine_periods(field, most).gratings
+    return examine_periods(field).gratings
 
 
 def examine_periods(field: HeightField, most: int = 3) -> Periods:
