@@ -122,9 +122,9 @@ def read_shares(text: str, needed: tuple[float, float]) -> tuple[Real, Real]:
     good = (value >= least) & (value <= most)
     if not good[inside].all():
         raise DiffractionError(
-            f"{table.shown}: reflectances are {raw[inside].min():g} to {raw[inside].max():g}; expected "
-            "0 to 1, or 0 to 100 per cent. Divide larger values by the reflectance of the white "
-            f"standard; say what the file has by {choice.path}:fraction or :percent"
+            f"{table.shown}: reflectances are {raw[inside].min():g} to {raw[inside].max():g}; "
+            "expected 0 to 1, or 0 to 100 per cent. Divide larger values by the reflectance of "
+            f"the white standard; say what the file has by {choice.path}:fraction or :percent"
         )
     bad = np.flatnonzero(~good)
     first, last = np.flatnonzero(inside)[[0, -1]]
@@ -132,8 +132,8 @@ def read_shares(text: str, needed: tuple[float, float]) -> tuple[Real, Real]:
     stop = int(bad[bad > last].min(initial=len(lam)))
     if stop - start < len(lam):
         warn(
-            f"{table.shown}: reflectances beyond {lam[start]:g} to {lam[stop - 1]:g} nm are not from 0 "
-            "to 1 and are left out"
+            f"{table.shown}: reflectances beyond {lam[start]:g} to {lam[stop - 1]:g} nm are not from "
+            "0 to 1 and are left out"
         )
     lam, value = lam[start:stop], value[start:stop]
     if (value < 0.0).any():
