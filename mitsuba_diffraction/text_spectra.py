@@ -132,8 +132,8 @@ def read_shares(text: str, needed: tuple[float, float]) -> tuple[Real, Real]:
     stop = int(bad[bad > last].min(initial=len(lam)))
     if stop - start < len(lam):
         warn(
-            f"{table.shown}: reflectances beyond {lam[start]:g} to {lam[stop - 1]:g} nm are not from "
-            "0 to 1 and are left out"
+            f"{table.shown}: reflectances beyond {lam[start]:g} to {lam[stop - 1]:g} nm are not "
+            "from 0 to 1 and are left out"
         )
     lam, value = lam[start:stop], value[start:stop]
     if (value < 0.0).any():
