@@ -262,7 +262,7 @@ def test_a_recipe_builds_the_planned_table_again(file, tmp_path):
     ],
 )
 def test_recipes_for_another_scene_are_refused(file, tmp_path, recipe, parameters, says):
-    np.save(file.with_name("other.npy"), PATCH.heights)
+    np.save(file.with_name("other.npy"), 0.5 * PATCH.heights)
     limited = tmp_path / "limited.toml"
     limited.write_text(
         f'source = "{file.with_name(recipe)}"\npixel_size = 0.3\ncoherence_width = 18\n'
