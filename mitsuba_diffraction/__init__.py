@@ -44,6 +44,7 @@ if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main_
     prepare()
 
 import importlib
+import pkgutil
 from typing import TYPE_CHECKING, Any
 
 from .errors import DiffractionError, DiffractionWarning
@@ -97,31 +98,29 @@ __all__ = [
 
 # Imported when first asked for: heights, tables and the reference need no Mitsuba, and renders
 # need no Matplotlib, which some load.
-_MODULES = {
+_PLACES = {
+    "DiffractionTable": "tables:DiffractionTable",
+    "HeightField": "heights:HeightField",
+    "OrderTable": "orders:OrderTable",
+    "TableSource": "tables:TableSource",
+    "bsdf_dict": "plugin.dictionary:bsdf_dict",
     "cluster": "cluster",
     "design": "analysis.design",
     "glsl": "realtime.glsl",
     "gratings": "heights.gratings",
+    "hologram": "scene.hologram:hologram",
     "maps": "analysis.maps",
     "osl": "osl",
     "period_fit": "thesis.period_fit",
+    "preset": "plugin.presets:preset",
     "profiles": "orders.solve.profiles",
+    "read_orders": "orders.imported:read_orders",
     "reference": "reference",
     "shader_comparison": "realtime.shader_comparison",
+    "solve_orders": "orders.solve.orders:solve_orders",
+    "spectrum": "analysis.spectra:spectrum",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
-}
-_NAMES = {
-    "DiffractionTable": "tables",
-    "HeightField": "heights",
-    "OrderTable": "orders",
-    "TableSource": "tables",
-    "bsdf_dict": "plugin.dictionary",
-    "hologram": "scene.hologram",
-    "preset": "plugin.presets",
-    "read_orders": "orders.imported",
-    "solve_orders": "orders.solve.orders",
-    "spectrum": "analysis.spectra",
 }
 
 
@@ -130,13 +129,11 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version(__name__)
-    if name in _MODULES:
-        if name in ("glsl", "shader_comparison"):
-            importlib.import_module(f"{__name__}.thesis.shaders")  # registers its methods
-        return importlib.import_module(f"{__name__}.{_MODULES[name]}")
-    if name in _NAMES:
-        return getattr(importlib.import_module(f"{__name__}.{_NAMES[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name in ("glsl", "shader_comparison"):
+        importlib.import_module(f"{__name__}.thesis.shaders")  # registers its methods
+    return pkgutil.resolve_name(f"{__name__}.{_PLACES[name]}")
 
 
 def __dir__() -> list[str]:

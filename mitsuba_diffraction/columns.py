@@ -16,13 +16,12 @@ All of them follow these rules:
 Exports of spectrometers (Ocean Optics, SpectraSuite, JAZ, Avantes, StellarNet, ProcSpec's text)
 follow them. Their columns of raw counts are left out where a processed one is beside them.
 
-`save_rows` and `save_numbers` write the CSV files of the package.
+`save_rows` writes the CSV files of the package.
 """
 
 from __future__ import annotations
 
 import csv
-import io
 import math
 import os
 import re
@@ -31,7 +30,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .arrays import Real
 from .atomic import atomic_path
@@ -348,18 +347,25 @@ def _is_number(cell: str) -> bool:
 
 
 def save_rows(
-    path: Path, names: Sequence[str], rows: Iterable[Mapping[str, Any]], digits: int = 17
+    path: Path,
+    names: Sequence[str],
+    rows: Iterable[Mapping[str, Any]] | Real,
+    digits: int | Sequence[int] = 17,
 ) -> None:
     """Write rows as CSV with these columns; values that a row lacks, and NaN, are empty.
 
+    rows : values by the names of columns; or numbers (n, columns).
+    digits : of numbers, of all columns or of each.
+
     Raises a DiffractionError if the file cannot be written.
     """
-    text = io.StringIO()
-    writer = csv.DictWriter(text, names, restval="", extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: _cell(v, digits) for k, v in row.items()} for row in rows)
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), "utf-8")
+    each = [digits] * len(names) if isinstance(digits, int) else digits
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        for row in rows:
+            cells = [row.get(n, "") for n in names] if isinstance(row, Mapping) else row
+            writer.writerow(_cell(*cell) for cell in zip(cells, each, strict=True))
 
 
 def _cell(value: Any, digits: int) -> Any:
@@ -373,18 +379,3 @@ def _cell(value: Any, digits: int) -> Any:
         return value
     text = printable(value)  # the line end of a name is not the row's
     return f"'{text}" if text.startswith(_FORMULAS) else text
-
-
-def save_numbers(
-    path: Path, names: Sequence[str], rows: ArrayLike, digits: str | Sequence[str] = "%.7g"
-) -> None:
-    """Write numbers (n, columns) as CSV.
-
-    digits : format of all columns, or of each.
-
-    Raises a DiffractionError if the file cannot be written.
-    """
-    with atomic_path(path) as temporary:
-        np.savetxt(
-            temporary, rows, digits, ",", header=",".join(names), comments="", encoding="utf-8"
-        )

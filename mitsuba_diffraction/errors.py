@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import sys
 import unicodedata
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 # Packages whose lines mean nothing to whoever reads a warning.
 _INTERNAL = ("mitsuba_diffraction", "mitsuba", "drjit")
@@ -91,6 +92,23 @@ def quoted(value: object) -> str:
     """Return a value as an error quotes it: in one line of at most 80 characters."""
     text = one_line(repr(value))
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+@contextlib.contextmanager
+def unreadable(what: str) -> Iterator[None]:
+    """Raise a DiffractionError for whatever a library raises inside on damaged data.
+
+    what : the file, and that it cannot be read; the first line of the library's reason follows.
+    """
+    try:
+        yield
+    except (DiffractionError, MemoryError):
+        raise
+    except Exception as error:
+        lines = str(error).strip().splitlines() or [type(error).__name__]
+        if isinstance(error, KeyError):  # whose text is the key alone
+            lines = [f"it has no {quoted(*error.args[:1] or [''])}"]
+        raise DiffractionError(f"{what}: {one_line(lines[0][:200])}") from error
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:

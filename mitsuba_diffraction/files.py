@@ -14,7 +14,8 @@ import re
 import stat
 import struct
 import tomllib
-from collections.abc import Collection
+import warnings
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -104,34 +105,22 @@ def kind_of(path: str | os.PathLike[str]) -> FileKind:
     return _SUFFIXES.get(Path(path).suffix.lower(), FileKind.INSTRUMENT)
 
 
-# Letters of `struct` of TIFF's types: BYTE, SHORT, LONG, UNDEFINED and DOUBLE.
-_TIFF_TYPES = {1: "B", 3: "H", 4: "I", 7: "B", 12: "d"}
-
-
-def tiff_tags(file: Path, wanted: Collection[int] = ()) -> dict[int, tuple[float, ...]]:
-    """Return the tags of a TIFF's first page: wanted ones with their numbers, others with none.
+def tiff_tags(file: Path) -> Mapping[int, Any]:
+    """Return the tags of a TIFF's first page, as Pillow's `ImageFileDirectory_v2` gives them.
 
     An incomplete directory gives the tags that are whole.
     """
-    found: dict[int, tuple[float, ...]] = {}
-    with file.open("rb") as stream, contextlib.suppress(struct.error):
-        head = stream.read(8)
-        order = "<" if head.startswith(b"II") else ">"
-        (start,) = struct.unpack(f"{order}I", head[4:])
-        stream.seek(start)
-        (count,) = struct.unpack(f"{order}H", stream.read(2))
-        entries = stream.read(12 * count)
-        for at in range(0, len(entries), 12):
-            tag, kind, number = struct.unpack_from(f"{order}HHI", entries, at)
-            found[tag], letter = (), _TIFF_TYPES.get(kind)
-            if tag not in wanted or letter is None:
-                continue
-            value, size = entries[at + 8 : at + 12], struct.calcsize(letter) * number
-            if size > len(value):
-                stream.seek(struct.unpack(f"{order}I", value)[0])
-                value = stream.read(size)
-            found[tag] = struct.unpack(f"{order}{number}{letter}", value[:size])
-    return found
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    with file.open("rb") as stream, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            tags = ImageFileDirectory_v2(stream.read(8))
+            stream.seek(tags.next)
+            tags.load(stream)
+        except (OSError, SyntaxError, struct.error):
+            return {}
+    return tags
 
 
 def readable_file(path: str | os.PathLike[str]) -> Path:
@@ -210,13 +199,13 @@ def read_bytes(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> byt
         raise DiffractionError(f"cannot read {str(file)!r}: {error.strerror}") from error
 
 
-def read_text(path: str | os.PathLike[str], largest: int = LARGEST_TEXT) -> str:
-    """Return the content of a text file in UTF-8 of at most `largest` bytes.
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Return the content of a text file in UTF-8 of at most `LARGEST_TEXT` bytes.
 
     Raises a DiffractionError as `readable_file` does, or if the file is larger, or not text.
     """
     try:
-        return read_bytes(path, largest).decode("utf-8")
+        return read_bytes(path, LARGEST_TEXT).decode("utf-8")
     except UnicodeDecodeError as error:
         raise DiffractionError(f"{os.fspath(path)!r} is not text (UTF-8)") from error
 

@@ -14,7 +14,7 @@ from urllib.parse import unquote
 
 from PIL import Image
 
-from .errors import DiffractionError, one_line
+from .errors import DiffractionError, unreadable
 from .extras import optional
 from .files import GLTF, path_beside, read_bytes, refuse_pipe
 from .images import without_programs
@@ -58,28 +58,10 @@ _COMPRESSED = {
 _READ = ("POSITION", "NORMAL", "TEXCOORD_0")
 
 
-class _Folder:
-    """Resolver of names for `trimesh`, which by itself opens pipes, and before 5.0 any file."""
-
-    def __init__(self, file: Path) -> None:
-        self._file = file
-        self.refused: DiffractionError | None = None  # `trimesh` ignores errors of pictures
-
-    def __getitem__(self, name: str) -> bytes:
-        """Return the content of a file beside the glTF file."""
-        try:
-            path = path_beside(self._file, unquote(name))
-            refuse_pipe(path)
-        except DiffractionError as error:
-            self.refused = error
-            raise
-        return read_bytes(path)
-
-
-def _names(document: dict[str, Any], *kinds: str) -> list[str]:
-    """Return the names of the files of a document's items, such as buffers, each once."""
+def _names(document: dict[str, Any], *kinds: str) -> dict[str, str]:
+    """Return the names of the files of a document's items, such as buffers, by their URIs."""
     uris = (str(item.get("uri", "data:")) for kind in kinds for item in document.get(kind, ()))
-    return [unquote(uri) for uri in dict.fromkeys(uris) if not uri.startswith("data:")]
+    return {uri: unquote(uri) for uri in uris if not uri.startswith("data:")}
 
 
 def named_files(file: Path) -> list[Path]:
@@ -91,7 +73,7 @@ def named_files(file: Path) -> list[Path]:
     if file.suffix.lower() not in GLTF:
         return found
     with contextlib.suppress(ValueError, LookupError, TypeError, AttributeError):
-        for name in _names(_parts(file)[0], "buffers", "images"):
+        for name in _names(_parts(file)[0], "buffers", "images").values():
             with contextlib.suppress(DiffractionError):
                 found.append(path_beside(file, name))
     return found
@@ -102,7 +84,7 @@ def materials_of(file: Path) -> list[GltfMaterial]:
 
     Raises a DiffractionError if the file is damaged.
     """
-    try:
+    with unreadable(f"'{file}' cannot be read as glTF"):
         document, _ = _parts(file)
         primitives = [p for mesh in document.get("meshes", ()) for p in mesh.get("primitives", ())]
         used = {primitive.get("material") for primitive in primitives}
@@ -122,10 +104,6 @@ def materials_of(file: Path) -> list[GltfMaterial]:
             found.append(GltfMaterial(number, name, metal, rough, tuple(left)))
         if None in used:
             found.append(GltfMaterial(len(all_materials), NO_MATERIAL, 0.0, 1.0, ()))
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise DiffractionError(
-            f"'{file}' cannot be read as glTF: {one_line(str(error))}"
-        ) from error
     return found
 
 
@@ -145,9 +123,9 @@ def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
     """
     trimesh = optional("trimesh", wanted_by)
     document, rest = _parts(file)
-    size, folder = file.stat().st_size, _Folder(file)
-    buffers = sum(path_beside(file, name).stat().st_size for name in _names(document, "buffers"))
-    _check(document, size + buffers, f"'{file}'")
+    size, buffers = file.stat().st_size, _names(document, "buffers").values()
+    held = sum(path_beside(file, name).stat().st_size for name in buffers)
+    _check(document, size + held, f"'{file}'")
     _check_encoding(document, f"'{file}'")
     if not materials:  # `trimesh` decodes pictures of some, and keeps UV only beside a material
         document["materials"] = [{} for _ in range(len(document.get("materials", ())) + 1)]
@@ -158,6 +136,11 @@ def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
                 primitive.setdefault("material", len(document["materials"]) - 1)
     for number, material in enumerate(document.get("materials", ())):
         material["name"] = str(number)
+    # `trimesh` by itself opens pipes, and before 5.0 any file
+    beside = {u: path_beside(file, n) for u, n in _names(document, "buffers", "images").items()}
+    for path in beside.values():
+        refuse_pipe(path)
+    contents = {uri: read_bytes(path) for uri, path in beside.items() if path.is_file()}
     content = json.dumps(document).encode()
     if rest is not None:
         content += b" " * (-len(content) % 4)
@@ -165,14 +148,10 @@ def load_gltf(file: Path, wanted_by: str, *, materials: bool = False) -> Any:
         content = head + struct.pack("<I4s", len(content), b"JSON") + content + rest
     with without_programs(), bounded_memory(size, f"'{file}'"), warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # sizes are checked later
-        try:
-            scene = trimesh.load_scene(
-                io.BytesIO(content), file_type=file.suffix[1:].lower(), process=False,
-                resolver=folder,
-            )  # fmt: skip
-        finally:
-            if folder.refused is not None:
-                raise folder.refused
+        scene = trimesh.load_scene(
+            io.BytesIO(content), file_type=file.suffix[1:].lower(), process=False,
+            resolver=contents,
+        )  # fmt: skip
     for mesh in scene.geometry.values():
         kept: Any = getattr(mesh.visual, "material", None)
         if not str(getattr(kept, "name", "")).isdecimal():

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 from PIL import EpsImagePlugin, Image, UnidentifiedImageError
 
 from .atomic import atomic_path
-from .errors import DiffractionError, one_line
+from .errors import DiffractionError, unreadable
 from .files import SOFTWARE, readable_file
 from .limits import check_content
 
@@ -69,12 +69,8 @@ def read_picture(path: Path) -> Image.Image:
     Raises a DiffractionError if the file cannot be read as one.
     """
     readable_file(path)
-    try:
-        with open_image(path) as picture:
-            return picture.copy()
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        reason = one_line(str(error))
-        raise DiffractionError(f"'{path}' cannot be read as a picture: {reason}") from error
+    with unreadable(f"'{path}' cannot be read as a picture"), open_image(path) as picture:
+        return picture.copy()
 
 
 def save_figure(path: Path, figure: Figure, **how: Any) -> None:

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import os
-import stat
 from collections.abc import Iterator
 
 from .errors import DiffractionError
 
 
 class _Noted:
-    """Files by device and inode, by which hard links and other spellings are told, and by path."""
+    """Real paths of files and folders; of files that are read with the names that users gave."""
 
     def __init__(self) -> None:
-        self.read: dict[tuple[int, int], str] = {}
-        self.paths: dict[str, str] = {}
+        self.read: dict[str, str] = {}
         self.written: set[str] = set()
         self.folders: set[str] = set()
 
@@ -41,13 +39,10 @@ def noted() -> Iterator[None]:
 
 def note_input(path: str | os.PathLike[str]) -> None:
     """Note that the command reads a file, unless the command itself has written it."""
-    if _noted is None:
-        return
-    with contextlib.suppress(OSError, ValueError):
-        place, status = os.path.realpath(path), os.stat(path)
-        if stat.S_ISREG(status.st_mode) and place not in _noted.written:
-            _noted.read[status.st_dev, status.st_ino] = place
-            _noted.paths.setdefault(place, os.fspath(path))
+    if _noted is not None and os.path.isfile(path):
+        place = os.path.realpath(path)
+        if place not in _noted.written:
+            _noted.read.setdefault(place, os.fspath(path))
 
 
 def note_folder(path: str | os.PathLike[str]) -> None:
@@ -64,18 +59,13 @@ def note_output(path: str | os.PathLike[str]) -> None:
 
 def input_at(path: str | os.PathLike[str]) -> str | None:
     """Return the name of the noted file that lies at a path, also under another name; or None."""
-    if _noted is None:
+    if _noted is None or not os.path.exists(path):
         return None
-    try:
-        status = os.stat(path)
-    except (OSError, ValueError):
-        return None
-    place = _noted.read.get((status.st_dev, status.st_ino), "")
-    with contextlib.suppress(OSError):
-        # an inode number serves again when its file is gone
-        if place and os.path.samestat(status, os.stat(place)):
-            return _noted.paths[place]
-    return _noted.paths.get(os.path.realpath(path))
+    for place, name in _noted.read.items():
+        with contextlib.suppress(OSError):  # of a file that is gone
+            if os.path.samefile(path, place):  # also a hard link
+                return name
+    return None
 
 
 def refuse_input(output: str | os.PathLike[str]) -> None:

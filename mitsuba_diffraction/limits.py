@@ -17,7 +17,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
-from .errors import DiffractionError
+import psutil
+
+from .errors import DiffractionError, unreadable
 
 #: Bytes of a file that is read whole.
 LARGEST_FILE = 1 << 32
@@ -90,11 +92,8 @@ def check_archive(path: Path, shown: str) -> None:
     """
     if not zipfile.is_zipfile(path):
         return
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-    except (zipfile.BadZipFile, NotImplementedError, ValueError, EOFError) as error:
-        raise DiffractionError(f"{shown} is a damaged ZIP archive: {error}") from error
+    with unreadable(f"{shown} is a damaged ZIP archive"), zipfile.ZipFile(path) as archive:
+        members = archive.infolist()
     size = path.stat().st_size
     check_content(sum(member.file_size for member in members), size, shown)
     for member in members:
@@ -140,19 +139,17 @@ def _address_space(more: int) -> Iterator[None]:
     if not sys.platform.startswith("linux"):
         yield
         return
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    pages = int(Path("/proc/self/statm").read_text("ascii").split()[0])
-    wanted = pages * resource.getpagesize() + more
+    process = psutil.Process()
+    before = process.rlimit(psutil.RLIMIT_AS)
+    wanted = process.memory_info().vms + more
     # a program's own limit stays
-    if before[0] != resource.RLIM_INFINITY:
+    if before[0] != psutil.RLIM_INFINITY:
         wanted = min(wanted, before[0])
-    resource.setrlimit(resource.RLIMIT_AS, (wanted, before[1]))
+    process.rlimit(psutil.RLIMIT_AS, (wanted, before[1]))
     try:
         yield
     finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)
+        process.rlimit(psutil.RLIMIT_AS, before)
 
 
 def tree_sizes(inner: Sequence[Sequence[int]]) -> list[float]:

@@ -15,7 +15,6 @@ import platform
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import DiffractionError
@@ -36,44 +35,34 @@ _VERSION_IN_NAME = re.compile(r"libLLVM(?:-|\.so\.|\.)(\d\d)(?!\d)", re.I)
 _VERSION_IN_FOLDER = re.compile(r"/llvm(?:@\d+/|[-@/])?(\d\d)[./]", re.I)
 
 
-@dataclass(frozen=True)
-class Library:
-    """A shared library of LLVM; `version` is its major version, None if its path does not tell."""
+def version_of(path: Path) -> int | None:
+    """Return the major version of LLVM by the path of its library; None if it does not tell.
 
-    path: Path
-    version: int | None
-
-    @classmethod
-    def at(cls, path: str | os.PathLike[str]) -> Library:
-        """The library at `path`, links followed, since only the real file's name is telling."""
-        real = Path(path).resolve()
-        version = _VERSION_IN_NAME.match(real.name) or _VERSION_IN_FOLDER.search(real.as_posix())
-        return cls(real, int(version[1]) if version else None)
-
-    def __str__(self) -> str:
-        return f"{self.version or 'unknown version'} ({self.path})"
+    Links are followed, since only the real file's name is telling.
+    """
+    real = path.resolve()
+    version = _VERSION_IN_NAME.match(real.name) or _VERSION_IN_FOLDER.search(real.as_posix())
+    return int(version[1]) if version else None
 
 
-def find_llvm() -> list[Library]:
-    """All of them, the one to prefer first: 19, then the newest, then unknown versions."""
+def find_llvm() -> list[Path]:
+    """Return all libraries, the one to prefer first: 19, the newest, then unknown versions."""
     named = named_library()
-    files = [*([named.path] if named else []), *in_folders()]
+    files = [*([named] if named else []), *in_folders()]
     return sorted(
-        {Library.at(file) for file in files if file.is_file()},
-        key=lambda found: (found.version != TESTED, -(found.version or 0), str(found.path)),
+        {file.resolve() for file in files if file.is_file()},
+        key=lambda file: (version_of(file) != TESTED, -(version_of(file) or 0), str(file)),
     )
 
 
-def named_library() -> Library | None:
+def named_library() -> Path | None:
     """Library that the environment variable names; the loader finds a bare file name."""
     value = os.environ.get(VARIABLE)
     if not value:
         return None
-    if Path(value).name == value and not Path(value).is_file():
-        for file in in_folders():
-            if file.name == value:
-                return Library.at(file)
-    return Library.at(value)
+    path = Path(value)
+    found = [] if path.is_file() else [file for file in in_folders() if file.name == value]
+    return (found[0] if found else path).resolve()
 
 
 def in_folders(
@@ -117,7 +106,7 @@ def in_folders(
         yield from (Path(entry.path) for entry in entries if _FILE.fullmatch(entry.name))
 
 
-def select_llvm() -> Library | None:
+def select_llvm() -> Path | None:
     """Point DRJIT_LIBLLVM_PATH to the best library, unless it is set or it is too late.
 
     Returns the choice. Without an LLVM there is no message: other backends do without, and
@@ -127,7 +116,7 @@ def select_llvm() -> Library | None:
         return None
     library = _best()
     if library is not None:
-        os.environ[VARIABLE] = str(library.path)
+        os.environ[VARIABLE] = str(library)
     return library
 
 
@@ -147,14 +136,35 @@ def require_llvm() -> None:
     Raises a DiffractionError if it cannot, with the versions found, the versions supported, and how
     to install one.
     """
-    named = named_library()
-    if "drjit" in sys.modules:
-        _require_loaded(named)
-    elif named is not None:
-        if fault := _fault_of(named):
-            raise DiffractionError(_bad_choice(named, fault))
-    elif _best() is None:
-        raise DiffractionError(_nothing_usable())
+    version, loaded = loaded_llvm_version(), "drjit" in sys.modules
+    if version is not None and version[0] >= OLDEST:
+        return
+    named, best = named_library(), _best()
+    if named is not None and (version is None or version_of(named) in (None, version[0])):
+        fault = _too_old(version[0]) if version else _fault_of(named)
+        if loaded or fault:
+            other = _best(apart_from=named)
+            remedy = f"set it to {other}, or unset it" if other else f"unset it, and {_install()}"
+            raise DiffractionError(
+                f'{VARIABLE}="{os.environ[VARIABLE]}": {fault or "Dr.Jit cannot load it"}; {remedy}'
+            )
+    elif best is None:
+        found = [f"{version_of(file) or 'unknown version'} ({file})" for file in find_llvm()]
+        raise DiffractionError(
+            f"there is no LLVM that Dr.Jit can use; found: {', '.join(found) or 'none'}; usable: "
+            f"{OLDEST} or newer, best {TESTED}; {_install()}"
+        )
+    elif loaded:
+        number = ".".join(map(str, version or ()))
+        what = (
+            "found no LLVM"
+            if version is None
+            else f"loaded LLVM {number}, which would end the process"
+        )
+        raise DiffractionError(
+            f"Dr.Jit has {what}; import mitsuba_diffraction before mitsuba and drjit, or start "
+            f"again with {VARIABLE}={best}"
+        )
 
 
 def require_loaded_llvm() -> None:
@@ -162,69 +172,24 @@ def require_loaded_llvm() -> None:
     import mitsuba as mi
 
     if (mi.variant() or "").startswith("llvm"):
-        _require_loaded(named_library())
+        require_llvm()
 
 
-def _require_loaded(named: Library | None) -> None:
-    version = loaded_llvm_version()
-    if version is not None and version[0] >= OLDEST:
-        return
-    if named is not None and (version is None or named.version in (None, version[0])):
-        fault = _too_old(version[0]) if version else _fault_of(named)
-        raise DiffractionError(_bad_choice(named, fault or "Dr.Jit cannot load it"))
-    if version is None:
-        raise DiffractionError(
-            f"Dr.Jit has found no LLVM; {_start_again()}" if _best() else _nothing_usable()
-        )
-    number = ".".join(map(str, version))
-    raise DiffractionError(
-        f"Dr.Jit has loaded LLVM {number}, which would end the process; {_start_again()}"
-    )
-
-
-def _best(apart_from: Library | None = None) -> Library | None:
+def _best(apart_from: Path | None = None) -> Path | None:
     libraries = (library for library in find_llvm() if library != apart_from)
     return next((library for library in libraries if _fault_of(library) is None), None)
 
 
-def _fault_of(library: Library) -> str | None:
+def _fault_of(library: Path) -> str | None:
     """Why Dr.Jit cannot work with it, as a clause, or None; a version untold may do."""
-    if not library.path.is_file():
+    if not library.is_file():
         return "there is no such file"
-    if library.version is not None and library.version < OLDEST:
-        return _too_old(library.version)
-    return None
-
-
-# ------------------------------------------------------------------------------- messages
+    version = version_of(library)
+    return _too_old(version) if version is not None and version < OLDEST else None
 
 
 def _too_old(version: int) -> str:
     return f"LLVM {version} cannot compile the kernels of Dr.Jit"
-
-
-def _bad_choice(named: Library, fault: str) -> str:
-    best = _best(apart_from=named)
-    remedy = f"set it to {best.path}, or unset it" if best else f"unset it, and {_install()}"
-    return f'{VARIABLE}="{os.environ.get(VARIABLE)}": {fault}; {remedy}'
-
-
-def _start_again() -> str:
-    best = _best()
-    if best is None:
-        return _install()
-    return (
-        "import mitsuba_diffraction before mitsuba and drjit, "
-        f"or start again with {VARIABLE}={best.path}"
-    )
-
-
-def _nothing_usable() -> str:
-    libraries = ", ".join(str(library) for library in find_llvm()) or "none"
-    return (
-        f"there is no LLVM that Dr.Jit can use; found: {libraries}; usable: {OLDEST} or newer, "
-        f"best {TESTED}; {_install()}"
-    )
 
 
 def _install() -> str:

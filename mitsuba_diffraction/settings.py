@@ -87,13 +87,9 @@ def parameters_of(record: type) -> dict[str, Parameter]:
     return {item.name: item.metadata["parameter"] for item in fields(record)}
 
 
-def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (str, numbers.Real)):
-        raise ValueError
-    return float(value)
+def among(*choices: str) -> Callable[[Any], str]:
+    """Return a check for one of these words."""
 
-
-def _among(*choices: str) -> Callable[[Any], str]:
     def check(value: Any) -> str:
         if not isinstance(value, str) or value not in choices:
             raise ValueError
@@ -102,24 +98,15 @@ def _among(*choices: str) -> Callable[[Any], str]:
     return check
 
 
-def _between(low: float, high: float) -> Callable[[Any], float]:
-    """Return a check for a number above `low` and up to `high`."""
+def _between(low: float, high: float, kind: type = float) -> Callable[[Any], Any]:
+    """Return a check for a number, or a whole number by kind=int, above `low` and up to `high`."""
+    accepted = str, numbers.Integral if kind is int else numbers.Real
 
-    def check(value: Any) -> float:
-        number = _number(value)
+    def check(value: Any) -> Any:
+        if isinstance(value, bool) or not isinstance(value, accepted):
+            raise ValueError
+        number = kind(value)
         if not low < number <= high:
-            raise ValueError
-        return number
-
-    return check
-
-
-def _count(most: int) -> Callable[[Any], int]:
-    def check(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, (str, numbers.Integral)):
-            raise ValueError
-        number = int(value)
-        if not 1 <= number <= most:
             raise ValueError
         return number
 
@@ -132,8 +119,8 @@ def _or(word: str | None, check: Callable[[Any], Any], *also: None) -> Callable[
 
 
 def _wavelengths(value: Any) -> tuple[float, float]:
-    low, high = (_number(end) for end in value)
-    if not 10.0 <= low < high <= 1e5:
+    low, high = map(_between(math.nextafter(10.0, 0.0), 1e5), value)
+    if not low < high:
         raise ValueError
     return low, high
 
@@ -145,7 +132,7 @@ def _half_axes(value: Any) -> tuple[float, float]:
 
 
 def _choices(*names: str) -> dict[str, Any]:
-    return {"check": _among(*names), "must": f"one of {', '.join(names)}", "choices": names}
+    return {"check": among(*names), "must": f"one of {', '.join(names)}", "choices": names}
 
 
 @dataclass(frozen=True)
@@ -194,11 +181,11 @@ class TableSettings:
         "relative error that is met", "between 1e-6 (single precision) and 1 (1e-3 is usual)", "E",
     )  # fmt: skip
     terms: int | None = parameter(
-        None, _or(None, _count(MAX_TERMS)), "terms of the series",
+        None, _or(None, _between(0, MAX_TERMS, int)), "terms of the series",
         f"a whole number from 1 to {MAX_TERMS}", "N", type=int,
     )  # fmt: skip
     taps: int | None = parameter(
-        None, _or(None, _count(MAX_TAPS)), "orders read in each direction",
+        None, _or(None, _between(0, MAX_TAPS, int)), "orders read in each direction",
         f"a whole number from 1 to {MAX_TAPS}", "N", type=int,
     )  # fmt: skip
     wavelength_range: tuple[float, float] = parameter(

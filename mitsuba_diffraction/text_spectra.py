@@ -96,8 +96,8 @@ def read_spectra(
     )  # fmt: skip
 
 
-def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real, Real]:
-    """Read a spectrum of shares, such as a reflectance.
+def read_shares(text: str, needed: tuple[float, float]) -> tuple[Real, Real]:
+    """Read a spectrum of reflectances.
 
     Per cent or fraction is what the text says, else the header, else a guess by the values, which a
     warning names. Noise a little below 0 is 0. Noise out of range beyond the needed wavelengths
@@ -113,18 +113,18 @@ def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real
     Raises a DiffractionError as `read_spectra` does, or if the values are no shares.
     """
     choice = choice_of(text)
-    lam, table = read_spectra(choice, f"{what} from 0 to 1 or in per cent")
+    lam, table = read_spectra(choice, "reflectances from 0 to 1 or in per cent")
     raw = table.numbers[:, 0]
     inside = (needed[0] <= lam) & (lam <= needed[1])
     inside = inside if inside.any() else np.ones_like(inside)
-    value = raw * _share_unit(choice, table, raw[inside], what)
+    value = raw * _share_unit(choice, table, raw[inside])
     least, most = -_NOISE, 1.0 + 1e-9
     good = (value >= least) & (value <= most)
     if not good[inside].all():
         raise DiffractionError(
-            f"{table.shown}: {what} are {raw[inside].min():g} to {raw[inside].max():g}; expected "
-            "0 to 1, or 0 to 100 per cent. Divide larger values by the reflectance of the white "
-            f"standard; say what the file has by {choice.path}:fraction or :percent"
+            f"{table.shown}: reflectances are {raw[inside].min():g} to {raw[inside].max():g}; "
+            "expected 0 to 1, or 0 to 100 per cent. Divide larger values by the reflectance of "
+            f"the white standard; say what the file has by {choice.path}:fraction or :percent"
         )
     bad = np.flatnonzero(~good)
     first, last = np.flatnonzero(inside)[[0, -1]]
@@ -132,16 +132,16 @@ def read_shares(text: str, what: str, needed: tuple[float, float]) -> tuple[Real
     stop = int(bad[bad > last].min(initial=len(lam)))
     if stop - start < len(lam):
         warn(
-            f"{table.shown}: {what} beyond {lam[start]:g} to {lam[stop - 1]:g} nm are not from 0 "
-            "to 1 and are left out"
+            f"{table.shown}: reflectances beyond {lam[start]:g} to {lam[stop - 1]:g} nm are not "
+            "from 0 to 1 and are left out"
         )
     lam, value = lam[start:stop], value[start:stop]
     if (value < 0.0).any():
-        warn(f"{table.shown}: {what} down to {value.min():.3g} are noise and are read as 0")
+        warn(f"{table.shown}: reflectances down to {value.min():.3g} are noise and are read as 0")
     return lam, np.clip(value, 0.0, 1.0)
 
 
-def _share_unit(choice: Choice, table: Columns, inside: Real, what: str) -> float:
+def _share_unit(choice: Choice, table: Columns, inside: Real) -> float:
     """Return the share that 1 in the file means."""
     if choice.unit:
         return SHARE_UNITS[choice.unit]
@@ -151,12 +151,12 @@ def _share_unit(choice: Choice, table: Columns, inside: Real, what: str) -> floa
         return 1.0
     if inside.max() <= _SURELY_PERCENT:
         raise DiffractionError(
-            f"{table.shown}: {what} up to {inside.max():g} may be fractions or per cent; say "
+            f"{table.shown}: reflectances up to {inside.max():g} may be fractions or per cent; say "
             f"which: {choice.path}:fraction or {choice.path}:percent, or behind the name of a "
             "column"
         )
     warn(
-        f"{table.shown}: {what} up to {inside.max():g} are read as per cent; "
+        f"{table.shown}: reflectances up to {inside.max():g} are read as per cent; "
         f"{choice.path}:percent says so"
     )
     return 0.01
@@ -165,13 +165,13 @@ def _share_unit(choice: Choice, table: Columns, inside: Real, what: str) -> floa
 def _in_nm(values: Real, unit: str, shown: str) -> Real:
     """Return wavelengths in nm; a unit that makes no light of them is overruled aloud."""
     stated = WAVELENGTH_UNITS.get(unit.lower(), WAVELENGTH_UNITS.get(unit.lower().rstrip("s")))
-    guesses = {name: WAVELENGTH_UNITS[name] for name in ("nm", "µm")}
-    for factor in ([stated] if stated else []) + [1.0, 1e3]:
+    for name, factor in ((unit, stated), ("nm", 1.0), ("µm", 1e3)):
+        if factor is None:
+            continue
         lam = values * factor
         if not (_LIGHT[0] <= lam.min() and lam.max() <= _LIGHT[1]):
             continue
         if factor != (stated or 1.0):
-            name = next(name for name, its in guesses.items() if its == factor)
             says = f"its header says {unit}" if stated else "its header has no unit"
             warn(
                 f"{shown}: wavelengths {values.min():g} to {values.max():g} are read as {name}; "

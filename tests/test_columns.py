@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.columns import read_columns
+from mitsuba_diffraction.columns import read_columns, save_rows
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.text_spectra import choice_of, read_shares, read_spectra
 
@@ -59,7 +59,7 @@ def test_shares_come_back_without_a_guess(tmp_path, name, text, encoding):
     file.write_text(text, encoding=encoding)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        lam, value = read_shares(str(tmp_path / name), "reflectances", NEEDED)
+        lam, value = read_shares(str(tmp_path / name), NEEDED)
     np.testing.assert_allclose(lam[[0, -1]], [300, 700], rtol=1e-12)
     # 9 digits are written; sparse files have three wavelengths
     np.testing.assert_allclose(np.interp([300, 500, 700], lam, value), [0.1, 0.225, 0.6], rtol=1e-8)
@@ -84,7 +84,7 @@ def test_shares_come_back_without_a_guess(tmp_path, name, text, encoding):
 def test_a_guess_is_said_aloud(tmp_path, text, guess):
     (tmp_path / "a.csv").write_text(text)
     with pytest.warns(DiffractionWarning, match=guess):
-        lam, value = read_shares(str(tmp_path / "a.csv"), "reflectances", NEEDED)
+        lam, value = read_shares(str(tmp_path / "a.csv"), NEEDED)
     np.testing.assert_allclose(np.interp([300, 500, 700], lam, value), [0.1, 0.225, 0.6], rtol=1e-8)
 
 
@@ -105,14 +105,14 @@ def test_a_guess_is_said_aloud(tmp_path, text, guess):
 def test_what_is_open_or_wrong_is_one_line(tmp_path, text, choice, named):
     (tmp_path / "a.csv").write_text(text)
     with pytest.raises(DiffractionError, match=named) as caught:
-        read_shares(str(tmp_path / "a.csv") + choice, "reflectances", NEEDED)
+        read_shares(str(tmp_path / "a.csv") + choice, NEEDED)
     assert "\n" not in str(caught.value)
 
 
 def test_a_column_and_a_unit_are_chosen_by_name(tmp_path):
     (tmp_path / "a.csv").write_text("wl,male,female\n" + lines(SHARE, 30 * SHARE))
     for ending, factor in (("male", 1.0), ("female:percent", 0.3), ("male:percent", 0.01)):
-        _, value = read_shares(f"{tmp_path / 'a.csv'}:{ending}", "reflectances", NEEDED)
+        _, value = read_shares(f"{tmp_path / 'a.csv'}:{ending}", NEEDED)
         np.testing.assert_allclose(value, factor * SHARE, rtol=1e-8)
     assert choice_of("sienna") == ("sienna", "", "")
     assert choice_of("C:/x/a.csv:b c:%") == ("C:/x/a.csv", "b c", "%")
@@ -140,3 +140,10 @@ def test_bytes_are_no_text(tmp_path):
     file.write_bytes(np.random.default_rng(0).bytes(4000))
     with pytest.raises(DiffractionError, match="export it as text"):
         read_columns(file)
+
+
+def test_names_of_columns_may_hold_the_separator(tmp_path):
+    save_rows(tmp_path / "a.csv", ["wl", "back, male"], np.array([[500.0, 0.25], [510.0, 0.5]]))
+    read = read_columns(tmp_path / "a.csv")
+    assert read.names == ("wl", "back, male")
+    assert np.array_equal(read.numbers, [[500.0, 0.25], [510.0, 0.5]])

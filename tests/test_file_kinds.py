@@ -10,7 +10,7 @@ import pytest
 from PIL import EpsImagePlugin, Image
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
-from mitsuba_diffraction.columns import save_numbers, save_rows
+from mitsuba_diffraction.columns import save_rows
 from mitsuba_diffraction.files import FileKind, kind_of
 from mitsuba_diffraction.images import FORMATS, open_image, save_figure
 from mitsuba_diffraction.scene.hologram import hologram
@@ -64,7 +64,7 @@ def test_plots_and_tables_that_the_program_writes_are_told_from_heights(tmp_path
     assert kind_of(tmp_path / "own.png") is FileKind.RESULT
     assert kind_of(tmp_path / "other.png") is FileKind.IMAGE
     save_rows(tmp_path / "survey.csv", ["file", "sample", "reason"], [])
-    save_numbers(tmp_path / "spectrum.csv", ["wl", "light30"], np.ones((2, 2)), "%g")
+    save_rows(tmp_path / "spectrum.csv", ["wl", "light30"], np.ones((2, 2)))
     np.savez_compressed(tmp_path / "evaluation.npz", wavelengths=np.ones(3), angles=np.ones(3))
     for name in ("survey.csv", "spectrum.csv", "evaluation.npz"):
         assert kind_of(tmp_path / name) is FileKind.RESULT

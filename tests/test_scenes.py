@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.files import FileKind, kind_of
-from mitsuba_diffraction.heights import Recipe
+from mitsuba_diffraction.heights import Source
 from mitsuba_diffraction.scene.parameters import parameters_of, scene_values
 from tests.support.scenes import SCENES, SMALL, rendered
 from tests.support.variants import use
@@ -44,7 +44,7 @@ def test_two_patches_share_the_snake_s_skin(gentle: dict[str, str]) -> None:
 def test_its_patch_is_a_recipe(name: str) -> None:
     defaults = parameters_of(SCENES / f"{name}.xml")
     assert defaults is not None
-    assert Recipe.load(SCENES / str(defaults["patch"])).generator
+    assert Source.of(SCENES / str(defaults["patch"])).generator
     advised = {"level", "periodic", "coherence_width"}  # by messages on heights
     assert {"spp", "resx", "resy", "patch", "pixel_size", "max_height", *advised} <= set(defaults)
 

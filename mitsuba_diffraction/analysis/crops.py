@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import DiffractionError
+from ..files import FileKind
 from ..heights import HeightField, LoadOptions, Source
 from ..heights.read import treated_by_default
 
@@ -34,7 +35,7 @@ def crops_of(
     """
     raw = options.updated(LoadOptions.parse(level="none"))
     source = Source.of(path, raw)
-    if source.recipe is not None:
+    if source.kind is FileKind.RECIPE:
         raise DiffractionError(f"'{path}' is a recipe; crops are cut from files of heights")
     whole = source.field()
     treatment = LoadOptions.parse(level=options.level, clip=options.clip, periodic=options.periodic)

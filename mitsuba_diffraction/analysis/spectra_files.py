@@ -16,7 +16,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ..arrays import Real
-from ..columns import save_numbers, save_rows
+from ..columns import save_rows
 from ..errors import DiffractionError
 from ..optics.colour import encode_srgb
 from .angular_variables import VARIABLES
@@ -125,7 +125,7 @@ def save_catches(
 
 def _write(path: str | os.PathLike[str], wavelength: Real, columns: dict[str, Real]) -> None:
     rows = np.column_stack([wavelength, *(100.0 * each for each in columns.values())])
-    save_numbers(Path(path), ["wl", *columns], rows, "%.6g")
+    save_rows(Path(path), ["wl", *columns], rows, digits=6)
 
 
 def colour_of(spectra: Spectra) -> Real:

@@ -26,7 +26,7 @@ from ..cluster.jobs import WorkerCalls
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..digests import key_of
 from ..errors import DiffractionError, DiffractionWarning, one_line
-from ..files import readable_file
+from ..files import FileKind, readable_file
 from ..heights import Source
 from ..heights.coherence import REPEATS, widest_window
 from ..heights.spectra import examine_periods
@@ -331,7 +331,7 @@ def ranked(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 def _crops_of(job: Job, file: Path, count: int) -> list[Job]:
     """Return a job for each crop of a scan; the job itself for recipes, and scans without crops."""
     options = job.treatment.options
-    if Source.of(file, options).recipe is not None:
+    if Source.of(file, options).kind is FileKind.RECIPE:
         return [job]
     found = crops_of(file, options, count, WINDOW)
     return [replace(job, crop=(n, count)) for n in range(len(found))] or [job]

@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import DiffractionError
 from ..files import GLTF, MESHES, FileKind
 from ..gltf import materials_of
-from ..heights import HeightField, Recipe, Source, jumping_lines
+from ..heights import HeightField, Source, jumping_lines
 from ..heights.coherence import resolved, width_reason
 from ..heights.formats.catalogue import sections
 from ..heights.spectra import LEAST_SHARE, examine_periods
@@ -111,8 +111,8 @@ def _formats(args: argparse.Namespace) -> Figures:
 
 def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     file, kind = args.file, source.kind
-    if source.recipe is not None:
-        return _recipe(source, source.recipe, args)
+    if source.kind is FileKind.RECIPE:
+        return _recipe(source, args)
     if kind is FileKind.SCENE:
         raise DiffractionError(
             f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
@@ -154,16 +154,16 @@ def _periods(field: HeightField) -> dict[str, Any]:
     return described
 
 
-def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[str, Any]:
+def _recipe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     fields = source.fields()
     settings = TableSettings(**{**source.settings, **options.table_options(args)})
     return {
         "kind": "recipe",
-        **({"generator": recipe.generator} if recipe.generator else {}),
-        "options": recipe.options.specified(),
+        **({"generator": source.generator} if source.generator else {}),
+        "options": source.options.specified(),
         "table": source.settings,
-        "output": str(recipe.output),
-        "output exists": recipe.output.is_file(),
+        "output": str(source.output),
+        "output exists": source.output.is_file(),
         "patches": [{**field.summary(), **_periods(field)} for field in fields],
         "window": width_reason(resolved(settings, fields), fields),
         "warnings": options.table_warnings(fields, settings),

@@ -397,8 +397,7 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
 def level_of(args: argparse.Namespace) -> str | None:
     """Return the surface to subtract that the command line or a recipe names, or None."""
-    recipe = Source.of(args.source, load_options(args)).as_recipe()
-    return None if recipe is None else recipe.options.level
+    return Source.of(args.source, load_options(args)).options.level
 
 
 def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> list[str]:

@@ -61,11 +61,12 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
     """Build one table and return its summary; the folder of a recipe's output may be made."""
     start = time.perf_counter()
     settings = source.settings_for(options.table_options(args))
-    is_new = source.recipe is not None and args.output is None
-    if source.recipe is None:
-        output = output_of(args, Path(f"{source.files[0].stem}.exr"))
+    of_recipe = source.kind is FileKind.RECIPE
+    is_new = of_recipe and args.output is None
+    if not of_recipe:
+        output = output_of(args, source.output)
     else:
-        output = args.output or source.recipe.output
+        output = args.output or source.output
         check_outputs([output], make_folder=is_new)
     with Bar(args) as bar:
         bar(0, 0, "making heights")
@@ -77,7 +78,8 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
         if is_new:
             make_folder(output.parent)
         table.save(output)
-    print(f"{', '.join(map(str, source.files))} -> {output}")
+    given = [source.path] if of_recipe else source.files
+    print(f"{', '.join(map(str, given))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
     if workers:

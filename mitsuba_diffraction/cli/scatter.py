@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..columns import save_numbers
+from ..columns import save_rows
 from ..errors import DiffractionError
 from ..heights.coherence import resolved
 from ..images import save_figure
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> Figures:
                 f"{low:.2g} to {high:.2g}, within {model.error:.0%}"
             )
     numbers = np.column_stack([spectrum.frequency, spectrum.density])
-    save_numbers(output, ("frequency_per_um", "psd_um4"), numbers)
+    save_rows(output, ("frequency_per_um", "psd_um4"), numbers, digits=7)
     figure = Figure(figsize=(6.0, 4.0), layout="constrained")
     axes = figure.subplots()
     axes.plot(spectrum.frequency, spectrum.density, label="heights")

@@ -203,7 +203,7 @@ def _measured_curve(
             "argument --measured: is compared with one curve, in per cent of white; give one "
             "--detector, and neither --group nor --relative"
         )
-    measured = read_shares(args.measured, "reflectances", (lam[0], lam[-1]))
+    measured = read_shares(args.measured, (lam[0], lam[-1]))
     _compared(args, *measured, lam, 0.0 * lam)
     return measured
 

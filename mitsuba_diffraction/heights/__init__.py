@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from .field import HeightField
 from .read import LoadOptions
-from .recipes import Recipe
 from .source import Source, load, treated
 from .spectra import dominant_periods, order_powers
 from .validity import (
@@ -33,7 +32,7 @@ from .validity import (
 )
 
 __all__ = [
-    "GENTLE_SLOPE", "STEEP_SLOPE", "HeightField", "LoadOptions", "Recipe", "Source",
+    "GENTLE_SLOPE", "STEEP_SLOPE", "HeightField", "LoadOptions", "Source",
     "coherence", "dominant_periods", "field", "jumping_lines", "lengths", "order_powers",
     "preprocess", "read", "recipes", "scatter", "source", "spectra", "stands_in_full",
     "units_warning", "validity",

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -104,55 +103,39 @@ def window_corners(rows: Sequence[int], columns: Sequence[int]) -> list[tuple[in
 
 def resolved_width(width: str | float, patches: Sequence[HeightField]) -> float:
     """Return the width of one window for all orders, µm: at most `widest_window`."""
-    return widths_of(width, patches, COHERENCES[1]).window
+    return widths_of(TableSettings(coherence=COHERENCES[1]), patches, width)[0]
 
 
-class Widths(NamedTuple):
-    """Widths of coherence windows, 4σ in µm: of all orders but 0, and of order 0."""
-
-    window: float
-    light: float
-
-
-def widths_of(width: str | float, patches: Sequence[HeightField], coherence: str) -> Widths:
-    """Return the widths for a coherence width of the light in µm or "auto", 65 µm.
+def widths_of(
+    settings: TableSettings, patches: Sequence[HeightField], width: str | float | None = None
+) -> tuple[float, float, float | None]:
+    """Return widths of coherence windows, µm: 4σ of all orders but 0, 4σ₀ of order 0, and 4σ_t.
 
     The patches limit the window of all orders but 0; if a width is asked for, scans and other parts
-    of larger surfaces do (`HeightField.cut_out`). One window, of coherence "patch" or "surface",
-    has one width for all orders, and as asked.
+    of larger surfaces do (`HeightField.cut_out`). One window, of coherence "patch", has one width
+    for all orders, and as asked. 4σ_t is `TableSettings.taper_width`, None for patches that tile
+    the plane.
+
+    width : of the light, µm or "auto", 65 µm; None for that of the settings.
     """
-    averaged, asked = coherence == COHERENCES[0], not isinstance(width, str)
+    width = settings.coherence_width if width is None else width
     light = USUAL_WIDTH if isinstance(width, str) else width
-    if asked:
-        patches = [patch for patch in patches if patch.cut_out and averaged]
-    window = min(light, widest_window(patches))
-    return Widths(window, light if averaged else window)
+    cut_out = [] if settings.coherent else [patch for patch in patches if patch.cut_out]
+    window = min(light, widest_window(patches if isinstance(width, str) else cut_out))
+    light = window if settings.coherent else light
+    asked = settings.windows if isinstance(settings.windows, float) else None
+    scans = [] if settings.basis == "taylor" else cut_out
+    if asked is None and not scans:
+        return window, light, None
+    side = widest_window(scans or patches)
+    window = min(window, side, usual_window(side) if asked is None else asked)
+    return window, light, window / math.sqrt(1.0 - LOOKUP**-2)
 
 
 def resolved(settings: TableSettings, patches: Sequence[HeightField]) -> TableSettings:
     """Return settings whose widths are numbers, limited by patches and windows of a scan."""
-    window, light = widths_of(settings.coherence_width, patches, settings.coherence)
-    window, taper = window_and_taper(settings, patches, window)
+    window, light, taper = widths_of(settings, patches)
     return replace(settings, coherence_width=light, window_width=window, taper_width=taper)
-
-
-def window_and_taper(
-    settings: TableSettings, patches: Sequence[HeightField], window: float
-) -> tuple[float, float | None]:
-    """Return 4σ of the window, µm, and 4σ_t of `TableSettings.taper_width`.
-
-    The latter is None for patches that tile the plane.
-
-    window : limit by the light and the patches, µm.
-    """
-    asked = settings.windows if isinstance(settings.windows, float) else None
-    averaged = not settings.coherent and settings.basis != "taylor"
-    scans = [patch for patch in patches if patch.cut_out] if averaged else []
-    if asked is None and not scans:
-        return window, None
-    side = widest_window(scans or patches)
-    window = min(window, side, usual_window(side) if asked is None else asked)
-    return window, window / math.sqrt(1.0 - LOOKUP**-2)
 
 
 def repeats(width: float, patches: Sequence[HeightField]) -> bool:

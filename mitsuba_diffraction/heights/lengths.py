@@ -1,4 +1,4 @@
-"""Checks of the lengths (µm), counts and seeds that users write as numbers or strings."""
+"""Checks of the lengths (µm) and counts that users write as numbers or strings."""
 
 from __future__ import annotations
 
@@ -44,28 +44,14 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
     """
     if is_auto(value):
         return None
-    expected = (
-        f"{where}: expected one length or a pair (dx, dy) in µm, each from {SHORTEST_PIXEL:g} "
-        f"to {LONGEST_PIXEL:g}, or 'auto'"
-    )
-    lengths = numbers_of(value) or ()
-    counted = len(lengths) in (1, 2)
-    if not counted or min(lengths) < SHORTEST_PIXEL or max(lengths) > LONGEST_PIXEL:
-        raise DiffractionError(f"{expected}; got {quoted(value)}")
+    try:
+        lengths = numbers_within(value, (1, 2), SHORTEST_PIXEL, LONGEST_PIXEL)
+    except ValueError:
+        raise DiffractionError(
+            f"{where}: expected one length or a pair (dx, dy) in µm, each from {SHORTEST_PIXEL:g} "
+            f"to {LONGEST_PIXEL:g}, or 'auto'; got {quoted(value)}"
+        ) from None
     return lengths[0], lengths[-1]
-
-
-def height_of(value: Height | None) -> float | None:
-    """Return a height in µm, above 0, from a number or numeric string; `None` for "auto".
-
-    Raises a ValueError for other values, as the other checks below.
-    """
-    if is_auto(value):
-        return None
-    lengths = numbers_of(value) or ()
-    if len(lengths) != 1 or not 0 < lengths[0] <= LONGEST_HEIGHT:
-        raise ValueError
-    return lengths[0]
 
 
 def micrometres_of(unit: str) -> float | None:
@@ -75,7 +61,10 @@ def micrometres_of(unit: str) -> float | None:
 
 
 def height_unit_of(value: str | None) -> str | None:
-    """Check a unit of length; `None` and "auto" give `None`: the file has to state it."""
+    """Check a unit of length; `None` and "auto" give `None`: the file has to state it.
+
+    Raises a ValueError for other values, as the other checks below.
+    """
     if is_auto(value):
         return None
     if not isinstance(value, str) or micrometres_of(value) is None:
@@ -88,17 +77,17 @@ def crop_of(value: Crop | None) -> tuple[float, ...] | None:
 
     `None` and "none" give `None`: no crop.
     """
-    if value is None or (isinstance(value, str) and value.strip() == "none"):
+    if is_auto(value, "none"):
         return None
-    lengths = numbers_of(value) or ()
-    if len(lengths) not in (1, 2, 4) or min(lengths[:2]) <= 0 or min(lengths) < 0:
+    lengths = numbers_within(value, (1, 2, 4), 0.0, math.inf)
+    if not min(lengths[:2]) > 0.0:
         raise ValueError
     return lengths if len(lengths) > 1 else (lengths[0], lengths[0])
 
 
-def is_auto(value: object) -> bool:
-    """Return whether a value is `None` or "auto": the file has to state it."""
-    return value is None or (isinstance(value, str) and value.strip().lower() == "auto")
+def is_auto(value: object, word: str = "auto") -> bool:
+    """Return whether a value is `None` or the word: with "auto" the file has to state it."""
+    return value is None or (isinstance(value, str) and value.strip().lower() == word)
 
 
 def numbers_of(value: object) -> tuple[float, ...] | None:
@@ -117,8 +106,14 @@ def numbers_of(value: object) -> tuple[float, ...] | None:
     return result if all(map(math.isfinite, result)) else None
 
 
-Lengths = float | Sequence[float]
-Counts = int | Sequence[int]
+def numbers_within(
+    value: object, counts: Sequence[int], least: float, most: float
+) -> tuple[float, ...]:
+    """Return `numbers_of` a value; a ValueError unless so many lie from `least` to `most`."""
+    found = numbers_of(value) or ()
+    if len(found) not in counts or not all(least <= number <= most for number in found):
+        raise ValueError
+    return found
 
 
 def number_between(value: float, where: str, least: float, most: float, unit: str = "") -> float:
@@ -144,31 +139,3 @@ def count_between(value: int, where: str, least: int, most: int) -> int:
             f"{where}: expected a whole number from {least} to {most}, got {quoted(value)}"
         )
     return int(value)
-
-
-def length_pair(value: Lengths, where: str, least: float, most: float) -> tuple[float, float]:
-    """Return lengths (along x, along y) in µm from one length for both or a pair."""
-    first, second = (number_between(n, where, least, most, " µm") for n in _pair(value, where))
-    return first, second
-
-
-def count_pair(value: Counts, where: str, least: int, most: int) -> tuple[int, int]:
-    """Return counts (along x, along y) from one count for both or a pair."""
-    first, second = _pair(value, where)
-    return count_between(first, where, least, most), count_between(second, where, least, most)
-
-
-def seed_of(value: int, where: str) -> int:
-    """Check a seed of NumPy's generators: a whole number from 0 to 2⁶³ − 1."""
-    return count_between(value, where, 0, 2**63 - 1)
-
-
-def _pair(value: object, where: str) -> tuple[Any, Any]:
-    """Return both elements of a pair, or a single value twice; the values are not checked."""
-    if not isinstance(value, (list, tuple)):
-        return value, value
-    if len(value) != 2:
-        raise DiffractionError(
-            f"{where}: expected one number or a pair (along x, along y), got {quoted(value)}"
-        )
-    return value[0], value[1]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-import numbers
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import DiffractionError, warn
 from ..files import FileKind, beginning, kind_of, readable_file
 from ..retired import retired_value
-from ..settings import parameter, parameters_of
+from ..settings import among, parameter, parameters_of
 from . import preprocess
 from .field import LARGE, HeightField
 from .formats import RawHeights
@@ -27,11 +27,10 @@ from .lengths import (
     LONGEST_PIXEL,
     SHORTEST_PIXEL,
     crop_of,
-    height_of,
     height_unit_of,
     is_auto,
     micrometres_of,
-    numbers_of,
+    numbers_within,
     pixel_size_of,
 )
 from .validity import tilted
@@ -60,26 +59,13 @@ def _choices(*choices: str, alone: str = "", metavar: str = "METHOD") -> dict[st
 
     alone : what to say before the choices.
     """
-
-    def check(value: object) -> str | None:
-        if value is None or is_auto(value):
-            return None
-        if not isinstance(value, str) or value not in choices:
-            raise ValueError
-        return value
-
-    must = f"{alone}one of {', '.join(map(repr, ('auto', *choices)))}"
-    return {"check": check, "must": must, "metavar": metavar}
+    check, must = among(*choices), f"{alone}one of {', '.join(map(repr, ('auto', *choices)))}"
+    return {"check": lambda v: None if is_auto(v) else check(v), "must": must, "metavar": metavar}
 
 
-def _sigmas(value: object) -> float | None:
-    """Check the number of standard deviations to keep: a number or numeric string from 1 on."""
-    if value is None or (isinstance(value, str) and value.strip() == "none"):
-        return None
-    sigmas = numbers_of(value) if isinstance(value, str | numbers.Real) else None
-    if sigmas is None or len(sigmas) != 1 or sigmas[0] < 1.0:
-        raise ValueError
-    return sigmas[0]
+def _number(word: str, least: float, most: float) -> Callable[[Any], float | None]:
+    """Return a check for a number or numeric string; None and the word give None."""
+    return lambda v: None if is_auto(v, word) else numbers_within(v, (1,), least, most)[0]
 
 
 @dataclass(frozen=True)
@@ -91,8 +77,9 @@ class LoadOptions:
         metavar="DX[,DY]",
     )  # fmt: skip
     max_height: float | None = parameter(
-        None, height_of, "µm, height of white in an image; other heights are scaled to span it "
-        "from end to end", f"a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'", "H",
+        None, _number("auto", math.ulp(0.0), LONGEST_HEIGHT),
+        "µm, height of white in an image; other heights are scaled to span it from end to end",
+        f"a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'", "H",
     )  # fmt: skip
     height_unit: str | None = parameter(
         None, height_unit_of, "unit of the numbers in the file, e.g. nm; overrides what it states",
@@ -117,7 +104,8 @@ class LoadOptions:
         **_choices("none", *LEVELS, alone="one surface (HeightField.treated subtracts another), "),
     )  # fmt: skip
     clip: float | None = parameter(
-        None, _sigmas, "clip heights beyond N robust standard deviations (dust)",
+        None, _number("none", 1.0, math.inf),
+        "clip heights beyond N robust standard deviations (dust)",
         "the number of standard deviations to keep, at least 1", "N",
     )  # fmt: skip
     periodic: str | None = parameter(

@@ -15,14 +15,12 @@ from __future__ import annotations
 
 import inspect
 import json
-import os
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError, check_keys
 from ..files import FileKind, kind_of, path_beside, read_toml
 from ..limits import MOST_PATCHES, check_count
@@ -40,80 +38,55 @@ SOLVED = "solved"
 SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """Checked content of one recipe file."""
+def read_recipe(file: Path, how: LoadOptions) -> dict[str, Any]:
+    """Read and check a recipe; return the attributes of its `Source`, without heights.
 
-    path: Path  # the recipe file
-    sources: tuple[Path, ...]  # files of heights; empty with a generator
-    generator: str | None  # name of a function of `mitsuba_diffraction.heights.gratings`, or `None`
-    # keyword arguments of the generator, one mapping per patch
-    arguments: tuple[Mapping[str, Any], ...]
-    options: LoadOptions  # how sources are read and all patches treated
-    table: Mapping[str, Any]  # fields of `TableSettings` that the recipe sets, checked
-    # path of the table; by default the recipe's name with .exr in the current folder
-    output: Path
+    how : options that precede the recipe's.
 
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Recipe:
-        """Read and check a recipe; heights are neither read nor generated yet.
+    Raises a DiffractionError if the file cannot be read, is not TOML, has a key that is unknown, of
+    the wrong type or contradicted by another or by an option, or names a generator that does not
+    exist; if it is a recipe of solved orders, which the room `solve` reads.
+    """
+    shown = repr(str(file))
+    content = read_toml(file)
+    if content.get("method") == SOLVED:
+        raise DiffractionError(
+            f"{shown} is a recipe of solved orders: run the command 'solve "
+            f"{shlex.quote(str(file))}', and give the table (.nc) that it writes"
+        )
+    for key in retired(content, shown):
+        del content[key]
+    check_keys(shown, content, _KEYS)
+    if ("source" in content) == ("generator" in content):
+        raise DiffractionError(
+            f"{shown} needs either source, a file, or generator, one of "
+            f"{', '.join(gratings.__all__)}"
+        )
+    options, settings = options_and_settings(content, shown)
+    options = options.updated(how)
+    if "generator" in content:
+        for key in SOURCE_ONLY:
+            if getattr(options, key) is not None:
+                raise DiffractionError(
+                    f"{shown} makes its heights with {content['generator']!r}; {key} contradicts "
+                    "it: change the recipe's [arguments] instead"
+                )
+    files = _sources(content, file, shown) if "source" in content else ()
+    arguments = () if files else _arguments(content, shown)
+    return {
+        "path": file, "files": files, "options": options, "generator": content.get("generator"),
+        "arguments": arguments, "settings": settings, "output": _output(content, file, shown),
+    }  # fmt: skip
 
-        Raises a DiffractionError if the file cannot be read, is not TOML, has a key that is
-        unknown, of the wrong type or contradicted by another, or names a generator that does not
-        exist; if it is a recipe of solved orders, which the room `solve` reads.
-        """
-        file = Path(path)
-        shown = repr(str(file))
-        content = read_toml(file)
-        if content.get("method") == SOLVED:
-            raise DiffractionError(
-                f"{shown} is a recipe of solved orders: run the command 'solve "
-                f"{shlex.quote(str(file))}', and give the table (.nc) that it writes"
-            )
-        for key in retired(content, shown):
-            del content[key]
-        check_keys(shown, content, _KEYS)
-        if ("source" in content) == ("generator" in content):
-            raise DiffractionError(
-                f"{shown} needs either source, a file, or generator, one of "
-                f"{', '.join(gratings.__all__)}"
-            )
-        options, table = options_and_settings(content, shown)
-        sources = _sources(content, file, shown) if "source" in content else ()
-        arguments = () if sources else _arguments(content, shown)
-        output = _output(content, file, shown)
-        return cls(file, sources, content.get("generator"), arguments, options, table, output)
 
-    def describes_heights_of(self, other: Recipe) -> bool:
-        """Whether both recipes name the same sources, or generator, and treatments."""
-        return self._heights() == other._heights()
-
-    def _heights(self) -> tuple[Any, ...]:
-        sources = [source.resolve() for source in self.sources]
-        return sources, self.generator, list(self.arguments), self.options
-
-    def save(self, path: Path, comment: str) -> None:
-        """Write the recipe, with paths relative to the file; `comment` stands above it.
-
-        Raises a DiffractionError if the file cannot be written.
-        """
-        content: dict[str, Any] = {}
-        arguments = [dict(values) for values in self.arguments]
-        if self.generator is None:
-            sources = [os.path.relpath(source, path.parent) for source in self.sources]
-            content["source"] = sources[0] if len(sources) == 1 else sources
-        else:
-            content["generator"] = self.generator
-            if len(arguments) > 1:  # which differ by their seeds alone
-                content["seeds"] = [values.pop("seed") for values in arguments]
-        content |= {**self.options.specified(), **self.table, "output": f"{path.stem}.exr"}
-        lines = [f"# {line}" for line in comment.splitlines()]
-        lines += [f"{name} = {_toml(value)}" for name, value in content.items()]
-        if arguments and arguments[0]:
-            lines += ["", "[arguments]"]
-            lines += [f"{name} = {_toml(value)}" for name, value in arguments[0].items()]
-        with atomic_path(path) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+def recipe_text(content: Mapping[str, Any], comment: str) -> str:
+    """Return the text of a recipe with these values; `comment` stands above it."""
+    lines = [f"# {line}" for line in comment.splitlines()]
+    tables = {name: value for name, value in content.items() if isinstance(value, dict)}
+    lines += [f"{name} = {_toml(content[name])}" for name in content if name not in tables]
+    for name, table in tables.items():
+        lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
+    return "\n".join(lines) + "\n"
 
 
 def _toml(value: Any) -> str:
@@ -157,12 +130,6 @@ def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, 
 
 def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any], ...]:
     """Check the generator and return its keyword arguments, one mapping for each patch."""
-    for key in SOURCE_ONLY:
-        if key in content:
-            raise DiffractionError(
-                f"{shown}: {key} is for a source, and the heights come from a generator; use its "
-                "[arguments]"
-            )
     name = content["generator"]
     if not isinstance(name, str) or name not in gratings.__all__:
         raise DiffractionError(
@@ -172,11 +139,7 @@ def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any
     if not isinstance(arguments, dict):
         raise DiffractionError(f"{shown}: arguments: expected a table [arguments]")
     parameters = inspect.signature(getattr(gratings, name)).parameters
-    for key in arguments:
-        if key not in parameters:
-            raise DiffractionError(
-                f"{shown}: [arguments]: {name!r} has no {key!r}; it has {', '.join(parameters)}"
-            )
+    check_keys(f"{shown}: [arguments] of {name!r}", arguments, [*parameters])
     for key, parameter in parameters.items():
         if parameter.default is parameter.empty and key not in arguments:
             raise DiffractionError(f"{shown}: [arguments]: {name!r} needs {key!r}")

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import shlex
 from collections.abc import Callable, Mapping, Sequence
@@ -13,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+from ..atomic import atomic_path
 from ..digests import key_of, sha256_of
 from ..errors import DiffractionError, counted
 from ..files import FileKind, kind_of, readable_file
@@ -21,7 +23,7 @@ from . import gratings
 from .field import HeightField
 from .lengths import Crop, Height, PixelSize
 from .read import LoadOptions, read_heights, treat
-from .recipes import SOURCE_ONLY, Recipe
+from .recipes import read_recipe, recipe_text
 from .validity import stands_in_full
 
 #: Name of a file.
@@ -35,16 +37,24 @@ class Source:
     Attributes
     ----------
     kind : kind of the file; None of several files, and of heights in memory.
-    files : the file, or several files of heights; () of heights in memory.
-    options : how heights are read; they precede the options of a recipe.
-    recipe : content of the file if it is a recipe, else None.
+    path : the file, or the first of several; None of heights in memory.
+    files : the files of heights, of a recipe those that it names; () with a generator.
+    options : how files are read and all patches treated: as asked, and then as a recipe says.
+    generator : name of a function of `heights.gratings`, or None.
+    arguments : keyword arguments of the generator, one mapping per patch.
+    settings : fields of `TableSettings` that a recipe sets, checked.
+    output : path of the table; by default the file's name with .exr in the current folder.
     patches : heights in memory, or () if they have to be read.
     """
 
     kind: FileKind | None
+    path: Path | None
     files: tuple[Path, ...]
     options: LoadOptions
-    recipe: Recipe | None = None
+    generator: str | None = None
+    arguments: tuple[Mapping[str, Any], ...] = ()
+    settings: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    output: Path = Path("table.exr")
     patches: tuple[HeightField, ...] = ()
 
     @classmethod
@@ -61,60 +71,46 @@ class Source:
             height fields.
         options : how heights are read, and height fields treated.
 
-        Raises a DiffractionError if a file cannot be read, or a recipe is not valid.
+        Raises a DiffractionError if a file cannot be read, or as `recipes.read_recipe` does.
         """
         how = options or LoadOptions()
         several = [value] if isinstance(value, str | os.PathLike | HeightField) else list(value)
         files = tuple(readable_file(v) for v in several if not isinstance(v, HeightField))
         if not files:
             fields = tuple(treat(v, how) for v in several if isinstance(v, HeightField))
-            return cls(None, (), how, patches=fields)
+            return cls(None, None, (), how, patches=fields)
         kinds = [kind_of(file) for file in files]
         if len(files) > 1 and FileKind.RECIPE in kinds:
             shown = files[kinds.index(FileKind.RECIPE)]
             raise DiffractionError(f"'{shown}' is a recipe; name it alone, or files of heights")
-        recipe = Recipe.load(files[0]) if kinds[0] is FileKind.RECIPE else None
-        return cls(kinds[0] if len(files) == 1 else None, files, how, recipe)
-
-    @property
-    def path(self) -> Path | None:
-        """The file; None of heights in memory."""
-        return self.files[0] if self.files else None
-
-    @property
-    def settings(self) -> Mapping[str, Any]:
-        """Fields of `TableSettings` that a recipe sets, checked."""
-        return {} if self.recipe is None else self.recipe.table
+        if kinds[0] is FileKind.RECIPE:
+            return cls(kinds[0], **read_recipe(files[0], how))
+        kind, output = kinds[0] if len(files) == 1 else None, Path(f"{files[0].stem}.exr")
+        return cls(kind, files[0], files, how, output=output)
 
     @cached_property
     def digest(self) -> str:
         """SHA-256 of all that the heights are made of.
 
-        Of files their bytes and the options; of a recipe its text, sources and the generators; of
-        height fields their numbers.
+        Of files and recipes the bytes of the files, the options, and the generators with their
+        arguments; of height fields their numbers.
         """
-        if not self.files:
-            first, *others = [field.digest() for field in self.patches]
+        if self.path is None:
+            first, *others = [patch.digest() for patch in self.patches]
             return key_of(first, *others) if others else first
-        recipe = self.recipe
-        if recipe is None:
-            return key_of(self.options.specified(), *map(sha256_of, map(readable_file, self.files)))
-        files = [readable_file(source) for source in recipe.sources]
-        if recipe.generator is not None:
-            files += sorted(Path(gratings.__file__).parent.glob("*.py"))
-        options = [recipe.options.specified(), self.options.specified()]
-        arguments = [dict(patch) for patch in recipe.arguments]
-        return key_of(options, recipe.generator, arguments, *map(sha256_of, files))
+        files = [readable_file(file) for file in self.files]
+        if self.generator is not None:
+            files = sorted(Path(gratings.__file__).parent.glob("*.py"))
+        arguments = [dict(values) for values in self.arguments]
+        return key_of(self.options.specified(), self.generator, arguments, *map(sha256_of, files))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the patches."""
         if self.patches:
-            return tuple(field.name for field in self.patches)
-        if self.recipe is None:
-            return tuple(file.name for file in self.files)
-        sources = tuple(source.name for source in self.recipe.sources)
-        return sources or (str(self.recipe.generator),) * len(self.recipe.arguments)
+            return tuple(patch.name for patch in self.patches)
+        files = tuple(file.name for file in self.files)
+        return files or (str(self.generator),) * len(self.arguments)
 
     def fields(self) -> list[HeightField]:
         """Read or generate the heights of all patches.
@@ -133,29 +129,24 @@ class Source:
                 f"'{self.path}' has solved orders, which leave where the grating equation says, "
                 "and no heights; 'mitsuba-diffraction orders', 'spectrum' and 'brdf-map' show it"
             )
-        if self.recipe is None:
-            return [read_heights(file, self.options, self.kind) for file in self.files]
-        recipe, merged = self.recipe, self.recipe.options.updated(self.options)
-        if recipe.generator is None:
-            return [read_heights(file, merged) for file in recipe.sources]
-        for key in SOURCE_ONLY:
-            if getattr(self.options, key) is not None:
-                raise DiffractionError(
-                    f"{str(recipe.path)!r} makes its heights with {recipe.generator!r}; {key} "
-                    "contradicts it: change the recipe's [arguments] instead"
-                )
-        generator: Callable[..., HeightField] = getattr(gratings, recipe.generator)
-        return [treat(_generated(generator, recipe, values), merged) for values in recipe.arguments]
+        if self.generator is None:
+            kind = None if self.kind is FileKind.RECIPE else self.kind
+            return [read_heights(file, self.options, kind) for file in self.files]
+        generate: Callable[..., HeightField] = getattr(gratings, self.generator)
+        try:
+            generated = [generate(**values) for values in self.arguments]
+        except DiffractionError as error:
+            raise DiffractionError(f"{str(self.path)!r}: [arguments]: {error}") from error
+        return [treat(patch, self.options) for patch in generated]
 
     def field(self) -> HeightField:
         """Read or generate the heights of the only patch.
 
         Raises a DiffractionError as `fields` does, and if there are several patches.
         """
-        recipe = self.recipe
-        if recipe is not None and (count := len(recipe.sources) or len(recipe.arguments)) > 1:
+        if (count := len(self.names)) > 1:
             raise DiffractionError(
-                f"{str(recipe.path)!r} describes {count} patches, where one is needed; precompute "
+                f"{str(self.path)!r} describes {count} patches, where one is needed; precompute "
                 "its table and use that"
             )
         return self.fields()[0]
@@ -164,14 +155,27 @@ class Source:
         """Return this source with its heights in memory; the digest stays."""
         return replace(self, patches=tuple(self.fields()))
 
-    def as_recipe(self) -> Recipe | None:
-        """Return the recipe of these heights; None of heights in memory, which no file names."""
-        if self.recipe is not None:
-            return replace(self.recipe, options=self.recipe.options.updated(self.options))
-        if self.path is None:
-            return None
-        output = Path(f"{self.path.stem}.exr")
-        return Recipe(self.path, self.files, None, (), self.options, {}, output)
+    def save(self, path: Path, comment: str) -> None:
+        """Write a recipe of files or a generator, with paths relative to the recipe.
+
+        comment : stands above it.
+
+        Raises a DiffractionError if the file cannot be written.
+        """
+        content: dict[str, Any] = {}
+        arguments = [dict(values) for values in self.arguments]
+        if self.generator is None:
+            files = [os.path.relpath(file, path.parent) for file in self.files]
+            content["source"] = files[0] if len(files) == 1 else files
+        else:
+            content["generator"] = self.generator
+            if len(arguments) > 1:  # which differ by their seeds alone
+                content["seeds"] = [values.pop("seed") for values in arguments]
+        content |= {**self.options.specified(), **self.settings, "output": f"{path.stem}.exr"}
+        if arguments and arguments[0]:
+            content["arguments"] = arguments[0]
+        with atomic_path(path) as temporary:
+            temporary.write_text(recipe_text(content, comment), encoding="utf-8")
 
 
 def load(
@@ -282,13 +286,3 @@ def treated(
     heights equal.
     """
     return treat(field, LoadOptions.parse(crop=crop, level=level, clip=clip, periodic=periodic))
-
-
-def _generated(
-    generator: Callable[..., HeightField], recipe: Recipe, arguments: Mapping[str, Any]
-) -> HeightField:
-    """Call a recipe's generator; its errors name the recipe."""
-    try:
-        return generator(**arguments)
-    except DiffractionError as error:
-        raise DiffractionError(f"{str(recipe.path)!r}: [arguments]: {error}") from error

@@ -124,9 +124,9 @@ def seen_slope(field: HeightField, shortest: float) -> float:
     return field.rms_slope * math.sqrt(seen / total) if total > 0.0 else field.rms_slope
 
 
-def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
+def dominant_periods(field: HeightField) -> list[Periodicity]:
     """Return the gratings of `examine_periods`."""
-    return examine_periods(field, most).gratings
+    return examine_periods(field).gratings
 
 
 def examine_periods(field: HeightField, most: int = 3) -> Periods:
@@ -330,16 +330,12 @@ def profile(
     count. Empty rings are NaN.
     """
     fx, fy = frequencies(field)
-    ring = np.digitize(np.hypot(fx, fy), edges)
-    if direction == "x":
-        ring[np.abs(fx) < 2 * np.abs(fy)] = 0
-    elif direction == "y":
-        ring[np.abs(fy) < 2 * np.abs(fx)] = 0
-    n = edges.size + 1
-    total = np.bincount(ring.ravel(), spectrum.ravel(), minlength=n)
-    count = np.bincount(ring.ravel(), minlength=n).astype(np.float64)
-    count[count == 0] = np.nan
-    return (total / count)[1:-1]
+    along, across = {"all": (np.ones(1), np.zeros(1)), "x": (fx, fy), "y": (fy, fx)}[direction]
+    used = np.broadcast_to(np.abs(along) >= 2 * np.abs(across), spectrum.shape)
+    radius = np.hypot(fx, fy)[used]
+    total, count = (np.histogram(radius, edges, weights=w)[0] for w in (spectrum[used], None))
+    with np.errstate(invalid="ignore"):  # empty rings
+        return np.asarray(total / count)
 
 
 def far_field(field: HeightField, wavelength: float, size: int = 201) -> Real:

@@ -14,7 +14,7 @@ from ..arrays import Real
 from ..errors import counted
 from .coherence import COLOURLESS
 from .field import LARGE, HeightField, blocks
-from .preprocess import MAD_TO_SIGMA, hann, level_plane, level_quadratic, plane_of, plane_rise
+from .preprocess import MAD_TO_SIGMA, arc_of, hann, level_plane, plane_of, plane_rise
 from .spectra import seen_slope
 
 #: RMS slopes up to which the default model's colours are within 5 % and 20 % of rigorous solutions,
@@ -258,10 +258,9 @@ def _bow(field: HeightField) -> str:
     """Return a line on a paraboloid that makes most of the relief."""
     if any("paraboloid" in line for line in field.history):
         return ""
-    level = level_plane(field)
-    even = level_quadratic(field)
-    bow = level.heights - even.heights
-    if bow.var() < BOW * level.heights.var() or np.ptp(bow) < LEAST_BOW:
+    level = level_plane(field).heights
+    bow = arc_of(level)
+    if bow.var() < BOW * level.var() or np.ptp(bow) < LEAST_BOW:
         return ""
     remedy = "level=quadratic"
     if _aligned(field):  # by the option that this one would replace

@@ -15,7 +15,7 @@ from scipy.io import netcdf_file
 
 from ..arrays import Real
 from ..atomic import atomic_path
-from ..columns import save_numbers
+from ..columns import save_rows
 from ..errors import DiffractionError
 from ..optics.orders import crossed_square
 from .efficiency import jones_matrices
@@ -64,9 +64,8 @@ class Listing(NamedTuple):
         if Path(path).suffix == ".nc":
             self._save_netcdf(Path(path))
             return
-        whole = (*CSV_AXES[3:], *PAIR, WITH_PHASE)
-        numbers = ["%d" if name in whole else "%.7g" for name in self.columns[3:]]
-        save_numbers(Path(path), self.columns, self.rows, ["%.9g", "%.9g", "%.9g", *numbers])
+        digits = [9, 9, 9, *[7] * (len(self.columns) - 3)]
+        save_rows(Path(path), self.columns, self.rows + 0.0, digits)  # no order -0
 
     def _save_netcdf(self, path: Path) -> None:
         """Write the numbers over wavelength, theta, phi and order; NaN where none propagates."""

@@ -71,7 +71,7 @@ def read_reflectance(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64
 
     Raises a DiffractionError if the file has no such column, or its reflectances are out of range.
     """
-    return read_shares(path, "reflectances", REQUIRED)
+    return read_shares(path, REQUIRED)
 
 
 def _is_spectrum(text: str) -> bool:

@@ -10,7 +10,7 @@ bsdf          `brdf` and `mueller`: the model with any window, material, coat an
 coat          wrapper of the model
 fresnel, through  float64 judges of the formulas of the same names in `optics`
 boundary      Jones and Mueller matrices, and the axes that they are about
-mirror        the correction of order 0 at the horizon, by its equation
+mirror        the correction of order 0 at the horizon
 transmission  `btdf`: light that goes through a dielectric
 grating       `orders_brdf`: a grating from the efficiencies of its orders
 screens       orders of phase screens: of a patch, and of a scan, which fade towards their edges

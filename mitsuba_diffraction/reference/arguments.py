@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
 from ..heights import HeightField
-from ..heights.coherence import widths_of, window_and_taper
+from ..heights.coherence import widths_of
 from ..optics.boundary import MODELS, checked_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
@@ -32,10 +32,8 @@ def sigmas_of(value: str | float, field: HeightField, coherence: str) -> Sigmas:
                 f"coherence_width={shown} must be a positive number of µm, or auto"
             )
         value = float(value)
-    width, light = widths_of(value, [field], coherence)
-    if coherence != COHERENCES[0]:
-        return Sigmas(sigma_of(width), sigma_of(light))
-    width, taper = window_and_taper(TableSettings(), [field], width)
+    settings = TableSettings(coherence=coherence if coherence in COHERENCES else COHERENCES[1])
+    width, light, taper = widths_of(settings, [field], value)
     if taper is None:
         return Sigmas(sigma_of(width), sigma_of(light))
     return Sigmas(LOOKUP * sigma_of(width), sigma_of(light), width)

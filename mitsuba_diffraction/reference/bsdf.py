@@ -18,14 +18,14 @@ from ..optics.blend import ScaleRoughness
 from ..optics.boundary import Heights, geometry
 from ..optics.boundary import model_of as registered_model
 from ..optics.fresnel import Filmed
-from ..optics.geometry import kirchhoff_factor, wavenumber
+from ..optics.geometry import wavenumber
 from ..settings import COHERENCES
 from . import boundary
 from . import coat as coats
 from . import model as models
 from .arguments import Window, directions_of, index_of, model_of, window_of
 from .integral import window_powers
-from .mirror import horizon_correction, interfering
+from .mirror import interfering
 from .model import Light
 
 #: A measure of Jones matrices (n, 2, 2): N of unpolarised light (n,), or Mueller matrices.
@@ -80,11 +80,7 @@ def brdf(
     index = index_of(eta, k, light.wavelength, film)
     name = model_of(model, index, coat=coat)
     if index is None:
-        others, zeroth, cosine = window_powers(field, *light, *window)
-        others *= kirchhoff_factor(*light, window.sigmas.orders)
-        zeroth *= horizon_correction(light, window.sigmas.zeroth)
-        area = (light.wavelength * 1e-3) ** 2 * np.pi * window.sigmas.orders**2
-        return interfering(others, zeroth / area, cosine)
+        index = np.full(len(light.wavelength), np.inf, complex)
     return _reflected(boundary.unpolarised, field, light, window, name, index, coat)
 
 

@@ -84,6 +84,7 @@ def amplitudes(cos_theta: ArrayLike, index: Index) -> tuple[Complex, Complex]:
     ----------
     cos_theta : cosine of the angle of incidence, 0 to 1, any shape.
     index : n + ik of the material relative to the medium above it; broadcasts with `cos_theta`.
+        Infinity is a perfect conductor.
     """
     cosine = np.asarray(cos_theta, np.float64)
     if isinstance(index, Filmed):
@@ -96,10 +97,12 @@ def amplitudes(cos_theta: ArrayLike, index: Index) -> tuple[Complex, Complex]:
         )
         return r_s, r_p
     n = np.asarray(index, np.complex128)
+    perfect = np.isinf(n)
+    n = np.where(perfect, 1.0, n)
     inside = decaying_root(n * n - (1.0 - cosine * cosine))  # n cosθ of the refracted wave
     r_s = (cosine - inside) / (cosine + inside)
     r_p = (n * n * cosine - inside) / (n * n * cosine + inside)
-    return r_s, r_p
+    return np.where(perfect, -1.0, r_s), np.where(perfect, 1.0, r_p)
 
 
 def decaying_root(square: Complex) -> Complex:
@@ -112,21 +115,7 @@ def reflectance(cos_theta: ArrayLike, index: Index) -> Real:
     """Fresnel reflectance for unpolarised light, the mean of both polarisations.
 
     Born and Wolf, Principles of Optics, section 1.5.2 (eq. 20 and 21), with a complex index
-    (section 14.2).
-
-    Parameters
-    ----------
-    cos_theta : cosine of the angle of incidence, 0 to 1, any shape.
-    index : n + ik of the material relative to the medium above it; broadcasts with `cos_theta`.
-        Infinity is a perfect conductor.
+    (section 14.2). Parameters as of `amplitudes`.
     """
-    cosine = np.asarray(cos_theta, np.float64)
-    if isinstance(index, Filmed):
-        return _mean_power(*amplitudes(cosine, index))
-    n = np.asarray(index, np.complex128)
-    perfect = np.isinf(n)
-    return np.where(perfect, 1.0, _mean_power(*amplitudes(cosine, np.where(perfect, 1.0, n))))
-
-
-def _mean_power(r_s: Complex, r_p: Complex) -> Real:
+    r_s, r_p = amplitudes(cos_theta, index)
     return np.asarray(0.5 * (np.abs(r_s) ** 2 + np.abs(r_p) ** 2))

@@ -33,7 +33,7 @@ def window_power(
     positions: Real | None = None,
 ) -> Real:
     """⟨|P|²⟩ of all orders in µm⁴, shape (n,); arguments as for `window_powers`."""
-    return _total(window_powers(field, wi, wo, wavelength, sigmas, coherence, positions))
+    return all_orders(window_powers(field, wi, wo, wavelength, sigmas, coherence, positions))
 
 
 def window_powers(
@@ -98,10 +98,10 @@ def screen_power(
     orders = orders_near((alpha, beta), sigmas.orders, screen, pixel_size)
     middle = 0.5 * np.array(screen.shape[::-1]) * pixel_size
     sums = sums_of(coherence, middle if centre is None else centre)
-    return float(_total(np.array(sums(orders, (alpha, beta), sigmas))))
+    return float(all_orders(np.array(sums(orders, (alpha, beta), sigmas))))
 
 
-def _total(powers: Real) -> Real:
+def all_orders(powers: Real) -> Real:
     """Return the power of all orders together, from `window_powers`."""
     others, zeroth, cosine = powers
     return np.asarray(others + zeroth + 2.0 * cosine * np.sqrt(others * zeroth))

@@ -1,11 +1,7 @@
-"""A mirror's lobe at the horizon, and the equation of C, the judge of its fit in `optics.mirror`.
-
-C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) C(Y) = 1.
-"""
+"""A mirror's lobe at the horizon, by the fit to C of equation (11) in `optics.mirror`."""
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,21 +9,6 @@ import numpy as np
 from ..arrays import Real
 from ..optics import mirror
 from ..optics.geometry import wavenumber
-
-# Nodes of X up to _REACH, beyond which C is 1; steps of the iteration
-_NODES, _REACH, _STEPS = 600, 8.0, 200
-
-
-@cache
-def solution() -> tuple[Real, Real]:
-    """Return X and C, (n,): the fixed point, by the geometric mean of two steps."""
-    x = (np.arange(_NODES) + 0.5) * _REACH / _NODES
-    kernel = np.exp(-((x[:, None] ** 2 - x**2) ** 2) / 4) / np.sqrt(np.pi) * x * _REACH / _NODES
-    inside = x < _REACH - 1.0  # the rest misses what lies beyond _REACH
-    c = np.ones_like(x)
-    for _ in range(_STEPS):
-        c = np.where(inside, np.sqrt(c / (kernel @ c)), 1.0)
-    return x, c
 
 
 def horizon_correction(light: Any, sigma: float) -> Real:

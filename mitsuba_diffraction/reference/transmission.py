@@ -8,15 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError
 from ..heights import HeightField
 from ..optics import through as formulas
-from ..optics.blend import ScaleRoughness
-from ..optics.geometry import wavenumber
 from ..settings import checked
 from . import boundary, mirror, through
 from .arguments import directions_of, index_of, model_of, sigmas_of
 from .coat import refracted
-from .integral import sums_of
-from .model import Light, small_slope_weight
-from .screens import patch_power
+from .integral import all_orders, sums_of
+from .model import Light, ensemble_power, share
 
 
 def btdf(
@@ -56,28 +53,21 @@ def btdf(
     inside = below
     if thin:
         inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
-    k, total = wavenumber(lam), above + eta * inside
-    kappa = -k * total[:, 2]
-    roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
+    # k times their sum is (q, κ) of (1)
+    optical = Light(-above, -eta * inside, lam)
     jones = through.kirchhoff(above, inside, eta)
     if model == "small_slope":
-        variance = roughness.at(k * np.hypot(*total[:, :2].T))
-        s = small_slope_weight(kappa, variance, eta)[:, None, None]
+        s = share(field, optical, np.asarray(eta))[:, None, None]
         jones = (1 - s) * jones + s * through.small_slope(above, inside, eta)
     if thin:
         jones = through.out_of_sheet(jones, above, below, eta)
-    frequency = -k[:, None] * total[:, :2]
     sums = sums_of(coherence, 0.5 * np.array(field.extent))
-    others, zeroth, cosine = np.transpose(
-        [
-            patch_power(field, phase, (x, y), sigmas, sums)
-            for phase, (x, y) in zip(kappa, frequency, strict=True)
-        ]
-    )
-    power = others + zeroth + 2.0 * cosine * np.sqrt(others * zeroth)
+    powers = ensemble_power(field, optical, sigmas, sums)
+    power = all_orders(powers)
     # order 0 has the flat surface's transmittance; speckle may be darker than its mean
-    zeroth = np.minimum(zeroth, power)
-    cosines = -4 * above[:, 2] * eta * inside[:, 2] / np.maximum(total[:, 2] ** 2, 1e-12)
+    zeroth = np.minimum(powers[1], power)
+    w_square = np.maximum((optical.wi + optical.wo)[:, 2] ** 2, 1e-12)
+    cosines = -4 * optical.wi[:, 2] * optical.wo[:, 2] / w_square
     orders = cosines * boundary.unpolarised(jones) * (power - zeroth)
     # a mirror's lobe of both directions above the surface transmits what it does not reflect
     outside, leaves = below * [1, 1, -1], np.ones(len(below), bool)

@@ -108,7 +108,7 @@ def files_of(scene: Path, values: Mapping[str, str] | None = None) -> list[Path]
     Raises a DiffractionError if a file is a pipe or a device, for which Mitsuba would wait, or an
     include lies outside of the scene's folder.
     """
-    from ..heights import Recipe
+    from ..heights import Source
 
     files: dict[Path, None] = {}
     waiting = [scene]
@@ -123,7 +123,7 @@ def files_of(scene: Path, values: Mapping[str, str] | None = None) -> list[Path]
         waiting += named_files(file)
         if kind_of(file) is FileKind.RECIPE:
             with contextlib.suppress(DiffractionError):  # its reader refuses a wrong recipe
-                waiting += Recipe.load(file).sources
+                waiting += Source.of(file).files
     return list(files)
 
 

@@ -110,8 +110,8 @@ class TableRequest:
         heights = [field.stretched(self.stretch) for field in source.fields()]
         table = build_with(heights, settings, self.progress)
         lines = warnings_of(heights, settings)
-        if lines and (recipe := source.as_recipe()) is not None:
-            lines = [notes_line(lines, recipe.path, recipe.options, settings)]
+        if lines and source.path is not None:
+            lines = [notes_line(lines, source.path, source.options, settings)]
         for line in lines:
             warn(line)
         return table

@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.heights import Recipe
+from mitsuba_diffraction.heights import Source
 from mitsuba_diffraction.scene import load_scene
 from mitsuba_diffraction.scene.orientation import load_mesh
 from mitsuba_diffraction.tables.document import parse_document, shape_of, with_coefficients
@@ -195,7 +195,7 @@ def check_heights(rng: np.random.Generator) -> None:
 
 def check_text(rng: np.random.Generator) -> None:
     """Recipes and meshes."""
-    _check(rng, ["recipe.toml"], lambda path: Recipe.load(path))
+    _check(rng, ["recipe.toml"], lambda path: Source.of(path))
     _check(rng, ["mesh.ply", "mesh.obj"], lambda path: load_mesh(path))
 
 

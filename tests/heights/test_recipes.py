@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.recipes import _KEYS, LOAD_KEYS, Recipe
+from mitsuba_diffraction.heights.recipes import _KEYS, LOAD_KEYS
 from mitsuba_diffraction.heights.source import Source
 from mitsuba_diffraction.settings import RECIPE_SETTINGS
 from tests.support.pages import first_columns
@@ -46,7 +46,7 @@ rows = 4
 
 @pytest.mark.parametrize("path", sorted(PRECOMPUTE.glob("*.toml")), ids=lambda path: path.stem)
 def test_recipes_of_the_project_are_valid(path):
-    recipe = Recipe.load(path)
+    recipe = Source.of(path)
     assert recipe.output == path.parent / "tables" / f"{path.stem}.exr"
 
 
@@ -93,15 +93,15 @@ coherence = "patch"
 wavelength_range = [400, 700]
 output = "out/x.exr"
 """
-    recipe = Recipe.load(write(folder, text))
-    assert recipe.table == {
+    recipe = Source.of(write(folder, text))
+    assert recipe.settings == {
         "coherence_width": 30,
         "coherence": "patch",
         "wavelength_range": (400, 700),
     }
     assert recipe.output == folder / "out/x.exr"
-    plain = Recipe.load(write(folder, 'source = "a.npy"'))
-    assert plain.table == {}
+    plain = Source.of(write(folder, 'source = "a.npy"'))
+    assert plain.settings == {}
     assert plain.output == Path("patch.exr")  # in the current folder
 
 
@@ -158,7 +158,7 @@ def test_seeds_are_several_patches(folder):
 )
 def test_what_does_not_fit_is_named(folder, text, words):
     with pytest.raises(DiffractionError) as caught:
-        Recipe.load(write(folder, text))
+        Source.of(write(folder, text))
     assert "patch.toml" in str(caught.value)
     assert "\n" not in str(caught.value)
     assert all(word in str(caught.value) for word in words)
@@ -170,7 +170,7 @@ def test_an_output_outside_of_the_recipe_s_folder_is_refused(folder, tmp_path_fa
         (folder / "away").symlink_to(tmp_path_factory.mktemp("elsewhere"))
     if (folder / "away").exists() or "away" not in output:
         with pytest.raises(DiffractionError, match="outside the file's folder"):
-            Recipe.load(write(folder, f'source = "a.npy"\noutput = "{output}"'))
+            Source.of(write(folder, f'source = "a.npy"\noutput = "{output}"'))
 
 
 def test_what_only_the_heights_can_tell_is_named_too(folder):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mitsuba_diffraction import llvm
-from mitsuba_diffraction.llvm import VARIABLE, Library
+from mitsuba_diffraction.llvm import VARIABLE, version_of
 from tests.support.machine import only
 
 
@@ -29,13 +29,13 @@ from tests.support.machine import only
     ],
 )
 def test_version_is_read_from_the_path(path: str, version: int | None):
-    assert Library.at(path).version == version
+    assert version_of(Path(path)) == version
 
 
 def test_version_is_that_of_the_real_file_behind_a_link(tmp_path: Path):
     (tmp_path / "libLLVM-15.so.1").touch()
     (tmp_path / "libLLVM-19.so").symlink_to("libLLVM-15.so.1")
-    assert Library.at(tmp_path / "libLLVM-19.so").version == 15
+    assert version_of(tmp_path / "libLLVM-19.so") == 15
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="searched through the loader path")
@@ -45,8 +45,8 @@ def test_only_llvm_itself_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         (tmp_path / name).touch()
     (tmp_path / "libLLVM-24.so.1").symlink_to("dangling")
     monkeypatch.setenv("LD_LIBRARY_PATH", str(tmp_path))
-    found = [library for library in llvm.find_llvm() if library.path.parent == tmp_path]
-    assert found == [Library(tmp_path / "libLLVM.so.23.1", 23)]
+    found = [library for library in llvm.find_llvm() if library.parent == tmp_path]
+    assert found == [tmp_path / "libLLVM.so.23.1"]
 
 
 def test_19_is_preferred_then_the_newest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -54,14 +54,14 @@ def test_19_is_preferred_then_the_newest(tmp_path: Path, monkeypatch: pytest.Mon
     for file in files:
         file.touch()
     only(monkeypatch, *files)
-    assert [library.version for library in llvm.find_llvm()] == [19, 21, 20, 17, 15]
+    assert [version_of(library) for library in llvm.find_llvm()] == [19, 21, 20, 17, 15]
 
 
 def test_bare_name_is_looked_up_as_the_loader_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "libLLVM-15.so.1").touch()
     only(monkeypatch, tmp_path / "libLLVM-15.so.1")
     monkeypatch.setenv(VARIABLE, "libLLVM-15.so.1")
-    assert llvm.named_library() == Library(tmp_path / "libLLVM-15.so.1", 15)
+    assert llvm.named_library() == tmp_path / "libLLVM-15.so.1"
 
 
 def touched(file: Path) -> Path:
@@ -84,7 +84,7 @@ def test_homebrew_keeps_versions_beside_each_other(tmp_path: Path):
         touched(cellar / "lib/libLLVM-C.dylib")
         (brew / "opt").mkdir(exist_ok=True)
         (brew / "opt" / name).symlink_to(cellar)
-    versions = {Library.at(file).version for file in found(tmp_path, "darwin")}
+    versions = {version_of(file) for file in found(tmp_path, "darwin")}
     assert versions == {19, 21}
 
 

@@ -11,7 +11,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.files import FileKind, kind_of
-from mitsuba_diffraction.heights import Recipe
+from mitsuba_diffraction.heights import Source
 from mitsuba_diffraction.plugin.parameters import NAMES
 from mitsuba_diffraction.plugin.presets import find_preset, presets
 from tests.support.lanes import refusal
@@ -26,7 +26,7 @@ def test_every_record_has_a_patch_and_parameters_of_its_plugin(name):
     assert look.about
     assert set(look.parameters) <= set(NAMES[look.plugin])
     if kind_of(look.patch) is not FileKind.ORDERS:
-        assert Recipe.load(look.patch).generator
+        assert Source.of(look.patch).generator
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from mitsuba_diffraction.optics.mirror import horizon_correction
 from mitsuba_diffraction.reference import boundary, fresnel, through
 from mitsuba_diffraction.reference.coat import refracted, transmitted
 from mitsuba_diffraction.reference.fresnel import amplitudes
-from mitsuba_diffraction.reference.mirror import solution
 from tests.support.directions import polar
 from tests.support.matrices import pairs
 
@@ -103,15 +102,12 @@ def test_under_a_coat_no_light_is_gained_whatever_the_structure_does_with_it(ind
             assert np.all(face[into] + most[:, out, into] * mirror[into] < 1.0 + 1e-9)
 
 
-def test_the_fit_at_the_horizon_is_that_of_the_fixed_point():
-    x, c = solution()
-    far, one = np.full_like(x, 99.0), np.float64(1.0)  # C = 1 at the other end
-    fitted = horizon_correction(x**2, far, one)
-    assert np.abs(fitted / c - 1.0).max() < 0.001
-
-
-def test_the_solution_at_the_horizon_is_a_fixed_point():
-    x, c = solution()
-    kernel = np.exp(-((x[:, None] ** 2 - x**2) ** 2) / 4.0) / np.sqrt(np.pi) * x * (x[1] - x[0])
-    # convergence of the iteration
-    np.testing.assert_allclose((c * (kernel @ c))[x < 6.0], 1.0, 1e-6)
+def test_the_fit_at_the_horizon_satisfies_its_equation():
+    """C(X) ∫₀^∞ Y dY/√π exp(−(X² − Y²)²/4) C(Y) = 1."""
+    nodes, reach = 1600, 9.0
+    x = (np.arange(nodes) + 0.5) * reach / nodes
+    kernel = np.exp(-((x[:, None] ** 2 - x**2) ** 2) / 4) / np.sqrt(np.pi) * x * reach / nodes
+    c = horizon_correction(x**2, np.full_like(x, 99.0), np.float64(1.0))  # C = 1 at the other end
+    inside = x < reach - 2.0  # the sum misses what lies beyond
+    # the fit is to 0.06 %; a C that is 0.1 % off, with any course, misses 1 by 0.0016 or more
+    np.testing.assert_allclose((c * (kernel @ c))[inside], 1.0, atol=0.001)

@@ -10,16 +10,16 @@ from pathlib import Path
 import pytest
 
 from mitsuba_diffraction import llvm
-from mitsuba_diffraction.llvm import Library
+from mitsuba_diffraction.llvm import version_of
 
-HERE = [Library.at(path) for path in llvm.in_folders()]
+HERE = [path.resolve() for path in llvm.in_folders()]
 
 
 def installed(version: int) -> Path:
     """The library of that version on this machine, or skip."""
     for library in HERE:
-        if library.version == version:
-            return library.path
+        if version_of(library) == version:
+            return library
     pytest.skip(f"LLVM {version} is not installed here")
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...arrays import Real
 from ...atomic import atomic_path
-from ...columns import save_numbers
+from ...columns import save_rows
 from ...progress import Progress, silent
 from ..maps.hemisphere import polar
 from .nodes import ExportGrid, Nodes, laid, light_vectors
@@ -76,7 +76,7 @@ def save_csv(
     bsdf: Any, path: Path, grid: ExportGrid = DEFAULT, text: str = "", progress: Progress = silent
 ) -> None:
     """Write the CSV, with the directions of `save_bird`; text is not in it."""
-    save_numbers(path, CSV_COLUMNS, _columns(bsdf, grid, progress))
+    save_rows(path, CSV_COLUMNS, _columns(bsdf, grid, progress), digits=7)
 
 
 def _columns(bsdf: Any, grid: ExportGrid, progress: Progress) -> Real:

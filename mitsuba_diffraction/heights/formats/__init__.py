@@ -16,9 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from ...errors import quoted
-
-__all__ = ["RawHeights", "catalogue", "first_line"]
+__all__ = ["RawHeights", "catalogue"]
 
 
 @dataclass
@@ -35,11 +33,3 @@ class RawHeights:
     unit: float | None = 1.0  # µm in one unit of the values; None if the file says no length
     stated: str = ""  # name of that unit in the file; "" if the format implies µm
     unclear: str = ""  # place in the file that names another unit than µm, though not the heights'
-
-
-def first_line(error: BaseException) -> str:
-    """Return the first line of an exception's text, to quote a library in a one-line message."""
-    if isinstance(error, KeyError):  # whose text is the key alone
-        return f"it has no {quoted(error.args[0] if error.args else '')}"
-    lines = str(error).strip().splitlines()
-    return lines[0][:200] if lines else type(error).__name__

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tokenize
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -12,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ...columns import Columns, read_columns
-from ...errors import DiffractionError, quoted, warn
+from ...errors import DiffractionError, quoted, unreadable, warn
 from ...limits import MOST_PIXELS
 from ..field import check_pixel_count
 from ..lengths import micrometres_of
 from ..preprocess import LARGEST_SHARE
-from . import RawHeights, first_line
+from . import RawHeights
 
 # bytes of a text of so many points, x, y and height
 _LARGEST = 24 * 3 * MOST_PIXELS
@@ -56,7 +55,7 @@ def read_npy(path: Path) -> RawHeights:
     two-dimensional array.
     """
     shown = repr(str(path))
-    try:
+    with unreadable(f"{shown} is not a readable NPY file"):
         values = np.load(path, mmap_mode="r", allow_pickle=False)
         if not isinstance(values, np.ndarray):
             raise DiffractionError(f"{shown} is an archive of arrays (NPZ); save one with np.save")
@@ -74,15 +73,6 @@ def read_npy(path: Path) -> RawHeights:
             heights = np.array(values, np.float64, order="C")
         heights.setflags(write=False)  # so that a HeightField need not copy it
         return RawHeights(heights)
-    except DiffractionError:
-        raise
-    except (
-        OSError, ValueError, EOFError, SyntaxError, TypeError, KeyError, OverflowError,
-        MemoryError, RecursionError, tokenize.TokenError,
-    ) as error:  # fmt: skip
-        raise DiffractionError(
-            f"{shown} is not a readable NPY file: {first_line(error)}"
-        ) from error
 
 
 def read_text(path: Path) -> RawHeights:

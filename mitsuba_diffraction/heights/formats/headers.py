@@ -12,7 +12,8 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
+from xml.etree import ElementTree
 
 from ...files import tiff_tags
 from ..lengths import micrometres_of
@@ -24,14 +25,13 @@ _ASPECT = re.compile(r"\\Aspect ratio: ([\d.]+):([\d.]+)", re.IGNORECASE)
 _SLOW = re.compile(r"\\Slow Axis Size: ([\d.eE+-]+) (~m|[^\s\\]+)", re.IGNORECASE)
 _ROWS = re.compile(r"\\Number of lines: (\d+)", re.IGNORECASE)
 _LINES = re.compile(r"\\Lines: (\d+)", re.IGNORECASE)
-# Bytes of Gwyddion's components without a length of their own.
-_GWY_ATOMS = {b"b": 1, b"c": 1, b"i": 4, b"q": 8, b"d": 8}
-_GWY_ARRAYS = {b"C": 1, b"I": 4, b"Q": 8, b"D": 8}
-# Exceptions of headers that are damaged, or of a kind that is not known here.
-_UNCLEAR = (
-    ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error, zipfile.BadZipFile,
-    RecursionError, RuntimeError, NotImplementedError, EOFError, OSError,
-)  # fmt: skip
+# A data field of Gwyddion's container with its size in bytes, and what it says of its lengths.
+_GWY_FIELD = re.compile(rb"/\d+/data\0oGwyDataField\0(.{4})", re.DOTALL)
+_GWY_LENGTHS = (
+    re.compile(rb"xreal\0d(.{8})", re.DOTALL),
+    re.compile(rb"yreal\0d(.{8})", re.DOTALL),
+    re.compile(rb"si_unit_xy\0oGwySIUnit\0.{4}unitstr\0s([^\0]*)\0", re.DOTALL),
+)
 
 
 class Stated(NamedTuple):
@@ -57,7 +57,7 @@ def stated_sizes(path: Path) -> list[Stated]:
     for begins, witness in _WITNESSES:
         if head.startswith(begins):
             # a header that the witness does not understand says nothing
-            with suppress(*_UNCLEAR):
+            with suppress(Exception):
                 sizes = witness(path, head)
                 return list(dict.fromkeys(s for s in sizes if s.width > 0.0 and s.height > 0.0))
     return []
@@ -92,74 +92,27 @@ def _nanoscope(path: Path, head: bytes) -> Iterator[Stated]:
 def _gwyddion(path: Path, head: bytes) -> Iterator[Stated]:
     """`xreal` and `yreal` of each data field, in the unit `si_unit_xy`, metres without prefix."""
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as file:
-        (container,) = _gwy_objects(file, 4, len(file))
-    for name, value in container[1].items():
-        if re.fullmatch(r"/\d+/data", name) and isinstance(value, tuple):
-            field = value[1]
-            unit = micrometres_of(field["si_unit_xy"][1].get("unitstr", ""))
-            if unit is not None:
-                yield Stated(abs(field["xreal"]) * unit, abs(field["yreal"]) * unit)
-
-
-def _gwy_objects(content: mmap.mmap, start: int, stop: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield name and components of the objects between two places; arrays are passed over."""
-    while start < stop:
-        name, start = _gwy_text(content, start)
-        (size,) = struct.unpack_from("<I", content, start)
-        start += 4
-        yield name, _gwy_components(content, start, start + size)
-        start += size
-
-
-def _gwy_components(content: mmap.mmap, at: int, stop: int) -> dict[str, Any]:
-    """Return the components of an object by name: numbers, texts, and objects as (name, parts)."""
-    found: dict[str, Any] = {}
-    while at < stop:
-        name, at = _gwy_text(content, at)
-        kind, at = content[at : at + 1], at + 1
-        if kind in _GWY_ATOMS:
-            if kind in b"id":
-                (found[name],) = struct.unpack_from("<" + kind.decode(), content, at)
-            at += _GWY_ATOMS[kind]
-        elif kind == b"s":
-            found[name], at = _gwy_text(content, at)
-        elif kind == b"o":
-            _, end = _gwy_text(content, at)
-            (size,) = struct.unpack_from("<I", content, end)
-            (found[name],) = _gwy_objects(content, at, end + 4 + size)
-            at = end + 4 + size
-        elif kind in _GWY_ARRAYS:
-            (count,) = struct.unpack_from("<I", content, at)
-            at += 4 + count * _GWY_ARRAYS[kind]
-        else:
-            raise ValueError
-    return found
-
-
-def _gwy_text(content: mmap.mmap, at: int) -> tuple[str, int]:
-    """Return a text that ends with a zero, and the place behind it."""
-    end = content.find(b"\0", at)
-    if end < 0:
-        raise ValueError
-    return content[at:end].decode("utf-8", "replace"), end + 1
+        at = 0
+        while field := _GWY_FIELD.search(file, at):
+            at = field.end() + int.from_bytes(field[1], "little")
+            x, y, unit = (part.search(file, field.end(), at) for part in _GWY_LENGTHS)
+            factor = micrometres_of(unit[1].decode("utf-8", "replace")) if unit else None
+            if x and y and factor is not None:
+                width, height = (abs(*struct.unpack("<d", part[1])) for part in (x, y))
+                yield Stated(width * factor, height * factor)
 
 
 def _x3p(path: Path, head: bytes) -> Iterator[Stated]:
     """`Increment`, m, of CX and CY times the size of the matrix (ISO 25178-72)."""
-    with zipfile.ZipFile(path) as archive:
-        text = archive.open("main.xml").read(_HEADER)
-
-    def value(*tags: str) -> float:
-        at = 0
-        for tag in tags:
-            match = re.compile(rf"<(?:\w+:)?{tag}>\s*([^<\s]*)".encode()).search(text, at)
-            if match is None:
-                raise ValueError
-            at = match.end()
-        return float(match[1]) if match else 0.0
-
-    width, height = (value(f"C{n}", "Increment") * value(f"Size{n}") * 1e6 for n in "XY")
-    yield Stated(width, height)
+    with zipfile.ZipFile(path) as archive, archive.open("main.xml") as stream:
+        root = ElementTree.parse(stream).getroot()
+    x, y = (
+        float(root.findtext(f".//{{*}}C{n}/{{*}}Increment", ""))
+        * float(root.findtext(f".//{{*}}Size{n}", ""))
+        * 1e6
+        for n in "XY"
+    )
+    yield Stated(x, y)
 
 
 def _sdf(path: Path, head: bytes) -> Iterator[Stated]:
@@ -226,11 +179,11 @@ def _nid(path: Path, head: bytes) -> Iterator[Stated]:
 def _tiff(path: Path, head: bytes) -> Iterator[Stated]:
     """Sizes in the header of Park Systems, µm, or the grid's lengths of JPK, m."""
     park, width, height = 50435, 0x8042, 0x8043
-    tags = tiff_tags(path, (park, width, height))
+    tags = tiff_tags(path)
     if park in tags:
-        yield Stated(*struct.unpack_from("<2d", bytes(map(int, tags[park][:156])), 140))
+        yield Stated(*struct.unpack_from("<2d", tags[park], 140))
     elif width in tags:
-        yield Stated(tags[width][0] * 1e6, tags[height][0] * 1e6)
+        yield Stated(tags[width] * 1e6, tags[height] * 1e6)
 
 
 def _mdt(path: Path, head: bytes) -> Iterator[Stated]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import struct
 import warnings
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,13 +12,13 @@ import numpy.typing as npt
 import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
-from ...errors import DiffractionError, counted
+from ...errors import DiffractionError, counted, unreadable
 from ...files import read_bytes, tiff_tags
 from ...images import open_image
 from ...limits import check_content
 from ...streams import without_chatter
 from ..field import check_pixel_count
-from . import RawHeights, first_line
+from . import RawHeights
 
 # Full scale of Pillow's integer modes, and names of the colour modes in messages.
 _FULL_SCALE = {"1": 1, "L": 255, "I;16": 65535, "I;16L": 65535, "I;16B": 65535, "I;16N": 65535}
@@ -39,13 +37,6 @@ _TURNED: dict[int, Callable[[Any], Any]] = {
     8: np.rot90,
 }  # fmt: skip
 
-# Exceptions that Pillow's decoders raise on damaged files.
-_DAMAGED = (
-    OSError, ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, EOFError,
-    OverflowError, MemoryError, NotImplementedError, RuntimeError, ZeroDivisionError, struct.error,
-    zlib.error,
-)  # fmt: skip
-
 
 def read_image(path: Path) -> RawHeights:
     """Read a grey PNG, BMP or TIFF of 1, 8 or 16 bits (relative), or of floats (µm).
@@ -59,23 +50,19 @@ def read_image(path: Path) -> RawHeights:
     pages.
     """
     shown = repr(str(path))
-    try:
-        with warnings.catch_warnings():
-            # The size is checked below, against a limit of our own and before anything is decoded.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
+    with unreadable(f"{shown} is damaged or incomplete"), warnings.catch_warnings():
+        # The size is checked below, against a limit of our own and before anything is decoded.
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
+        try:
             with open_image(path, ("PNG", "BMP", "DIB", "TIFF")) as image:
                 return _heights_of(image, shown)
-    except DiffractionError:
-        raise
-    except UnidentifiedImageError as error:
-        if (doubles := _doubles(path, shown)) is not None:
-            return RawHeights(doubles[::-1])
-        raise DiffractionError(
-            f"{shown} is not a readable PNG, BMP or TIFF image; is it damaged or misnamed?"
-        ) from error
-    except _DAMAGED as error:
-        raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
+        except UnidentifiedImageError as error:
+            if (doubles := _doubles(path, shown)) is not None:
+                return RawHeights(doubles[::-1])
+            raise DiffractionError(
+                f"{shown} is not a readable PNG, BMP or TIFF image; is it damaged or misnamed?"
+            ) from error
 
 
 def _heights_of(image: Image.Image, shown: str) -> RawHeights:
@@ -108,26 +95,20 @@ def _doubles(path: Path, shown: str) -> npt.NDArray[np.float64] | None:
     order = {b"II*\0": "<", b"MM\0*": ">"}.get(content[:4])
     if order is None:
         return None
-    try:
-        doubles = {258: (64,), 277: (1,), 339: (3,)}
-        tags = tiff_tags(path, {*doubles, 256, 257, 259, 273, 279, _ORIENTATION})
-        if any(tags.get(tag, (1,)) != value for tag, value in doubles.items()):
-            return None
-        if tags.get(259, (1,)) != (1,) or 273 not in tags:
-            raise DiffractionError(
-                f"{shown} has 64-bit floats that are compressed or in tiles; save it uncompressed, "
-                "or as 32-bit float in µm"
-            )
-        nx, ny = int(tags[256][0]), int(tags[257][0])
-        check_pixel_count(ny, nx, shown)
-        strips = (map(int, pair) for pair in zip(tags[273], tags[279], strict=True))
-        data = b"".join(content[place : place + size] for place, size in strips)
-        heights = np.frombuffer(data, f"{order}f8").reshape(ny, nx).astype(np.float64)
-    except (KeyError, IndexError, ValueError) as error:
-        if isinstance(error, DiffractionError):
-            raise
-        raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
-    return np.asarray(_TURNED.get(int(tags.get(_ORIENTATION, (1,))[0]), _TURNED[1])(heights))
+    tags = tiff_tags(path)
+    if (tags.get(258), tags.get(277, 1), tags.get(339)) != ((64,), 1, (3,)):
+        return None
+    if tags.get(259, 1) != 1 or 273 not in tags:
+        raise DiffractionError(
+            f"{shown} has 64-bit floats that are compressed or in tiles; save it uncompressed, "
+            "or as 32-bit float in µm"
+        )
+    nx, ny = int(tags[256]), int(tags[257])
+    check_pixel_count(ny, nx, shown)
+    strips = zip(tags[273], tags[279], strict=True)
+    data = b"".join(content[place : place + size] for place, size in strips)
+    heights = np.frombuffer(data, f"{order}f8").reshape(ny, nx).astype(np.float64)
+    return np.asarray(_TURNED.get(tags.get(_ORIENTATION, 1), _TURNED[1])(heights))
 
 
 def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
@@ -163,7 +144,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
     or several channels while `channel` is `None`.
     """
     shown = repr(str(path))
-    try:
+    with unreadable(f"{shown} is not a readable EXR image"):
         with without_chatter():
             file = OpenEXR.File(str(path), header_only=True)
         if len(file.parts) > 1:
@@ -180,11 +161,6 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
         chosen = _choose_channel(names, channel, shown)
         with without_chatter(), OpenEXR.File(str(path), separate_channels=True) as file:
             pixels = file.channels()[chosen].pixels
-    except DiffractionError:
-        raise
-    # OpenEXR raises RuntimeError and ValueError; damaged headers cause the others
-    except (RuntimeError, ValueError, OSError, KeyError, IndexError, TypeError, MemoryError) as e:
-        raise DiffractionError(f"{shown} is not a readable EXR image: {first_line(e)}") from e
     if pixels is None or pixels.ndim != 2:
         raise DiffractionError(f"{shown}: channel {chosen!r} has no two-dimensional pixels")
     return RawHeights(np.asarray(pixels, dtype=np.float64)[::-1])

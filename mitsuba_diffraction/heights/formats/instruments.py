@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import warnings
 from collections import deque
@@ -11,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import DiffractionError, warn
+from ...errors import DiffractionError, unreadable, warn
 from ...extras import optional
 from ...files import beginning
 from ...limits import bounded_lines, bounded_memory, check_archive, check_content
 from ..field import check_pixel_count
-from . import RawHeights, first_line
+from ..lengths import micrometres_of
+from . import RawHeights
 from .catalogue import way_out
 from .headers import stated_sizes
 
@@ -32,7 +34,6 @@ _HEIGHT = re.compile(
 )
 # Formats of arrays, which have no header that says how they lie.
 _ARRAYS = ("h5", "mat", "npz")
-_MICROMETRE = "µm"
 #: Relative difference up to which two statements of a size are one: rounding.
 _SAME_SIZE = 0.01
 #: Ratio up to which two statements of the heights' span are one: programs print the span of a
@@ -75,27 +76,19 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         topography = optional("SurfaceTopography.IO", shown)
         # On damaged data, some forty readers of binary formats raise anything from struct.error to
         # AssertionError; each becomes one line with its cause attached.
-        try:
-            reader = topography.open_topography(str(path))
-        except unknown as error:
-            raise _why_unknown(path, topography.readers) from error
-        except MemoryError:
-            raise
-        except Exception as error:
-            raise DiffractionError(f"{shown} cannot be read: {first_line(error)}") from error
-        try:
+        with unreadable(f"{shown} cannot be read"):
+            try:
+                reader = topography.open_topography(str(path))
+            except unknown as error:
+                raise _why_unknown(path, topography.readers) from error
+        with (
+            contextlib.closing(reader),
+            unreadable(f"{shown} ({reader.format()}) is damaged or not supported"),
+        ):
             chosen, note = _choose(list(reader.channels), channel, shown)
             raw = _read_channel(reader, chosen, shown, size)
             if reader.format() in _ARRAYS:
                 note += "; the first index of the array runs along x, the second from the top down"
-        except (DiffractionError, MemoryError):
-            raise
-        except Exception as error:
-            raise DiffractionError(
-                f"{shown} ({reader.format()}) is damaged or not supported: {first_line(error)}"
-            ) from error
-        finally:
-            reader.close()
     raw.notes = (note,)
     return _witnessed(raw, path)
 
@@ -107,13 +100,11 @@ def _why_unknown(path: Path, readers: Sequence[Any]) -> DiffractionError:
         named = path.suffix.lower().lstrip(".") in reader.file_extensions()
         if named or reader.can_read(begins).name == "YES":
             try:
-                reader(str(path)).close()
-            except Exception as error:
-                if type(error).__name__ != "FileFormatMismatch":
-                    return DiffractionError(
-                        f"{shown} is damaged or not supported, as {reader.name()}: "
-                        f"{first_line(error)}"
-                    )
+                with unreadable(f"{shown} is damaged or not supported, as {reader.name()}"):
+                    reader(str(path)).close()
+            except DiffractionError as error:
+                if type(error.__cause__).__name__ != "FileFormatMismatch":
+                    return error
     return DiffractionError(
         f"{shown} is not a height field of a known kind; expected an image (PNG, BMP, TIFF, EXR), "
         "an array (NPY), text (TXT, CSV), a recipe (TOML) or an instrument file, undamaged; "
@@ -224,12 +215,8 @@ def _named(channels: list[Any], name: str | int, shown: str) -> Any:
 
 def _why_none(channels: list[Any], shown: str) -> DiffractionError:
     """Return the error of a file without any channel of heights."""
-    if all(c.dim == 1 for c in channels):
-        return DiffractionError(f"{shown} holds line scans; a height field needs a map (ny, nx)")
-    if all(c.is_uniform is False for c in channels):
-        return DiffractionError(
-            f"{shown} is not on a uniform grid; interpolate its points to one first"
-        )
+    if all(c.dim == 1 or c.is_uniform is False for c in channels):
+        _check_map(channels[0], shown)
     return DiffractionError(
         f"{shown} has no height channel among {_list(channels)}; if one of them holds heights, "
         "name it with channel"
@@ -244,26 +231,14 @@ def _units(channel: Any) -> tuple[str | None, str | None]:
     return unit, channel.data_unit if channel.data_unit is not None else unit
 
 
-def _in_micrometres(unit: str | None) -> float | None:
-    """Return how many µm one `unit` is, or `None` if it is not a unit of length."""
-    from SurfaceTopography.Support.UnitConversion import (
-        get_unit_conversion_factor,
-        is_length_unit,
-    )
-
-    if not isinstance(unit, str) or not is_length_unit(unit):
-        return None
-    return float(get_unit_conversion_factor(unit, _MICROMETRE))
-
-
 def _is_height(channel: Any) -> bool:
     """Return whether a channel is a map of heights in units of length."""
     lateral, height = _units(channel)
     return (
         channel.dim != 1
         and bool(channel.is_height_channel)
-        and _in_micrometres(lateral) is not None
-        and _in_micrometres(height) is not None
+        and micrometres_of(lateral or "") is not None
+        and micrometres_of(height or "") is not None
     )
 
 
@@ -288,7 +263,7 @@ def _read_channel(reader: Any, channel: Any, shown: str, size: int) -> RawHeight
     topography = reader.topography(channel_index=channel.index, **options)
     _check_map(topography, what)  # some readers know the grid only after reading
     lateral, height = _units(channel)
-    lateral_scale = _in_micrometres(lateral)
+    lateral_scale = micrometres_of(lateral or "")
     values = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
     nx, ny = values.shape
     check_pixel_count(ny, nx, what)
@@ -298,5 +273,5 @@ def _read_channel(reader: Any, channel: Any, shown: str, size: int) -> RawHeight
         pixel_size = (width / nx, length / ny)
     # heights()[ix, iy] with iy downwards from the top of the picture, as instruments show it
     return RawHeights(
-        values.T[::-1], pixel_size, unit=_in_micrometres(height), stated=str(height or "")
+        values.T[::-1], pixel_size, unit=micrometres_of(height or ""), stated=str(height or "")
     )

@@ -27,9 +27,9 @@ import numpy.typing as npt
 
 from ...arrays import Real
 from ..field import HeightField
-from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
+from ..lengths import number_between
 from .fingers import ramp
-from .noise import Rng, grain, rounded
+from .noise import Counts, Lengths, Rng, grain, grid, patch
 
 _SHORTEST_RUN, _LONGEST_RUN = 3, 11  # channel bits
 # λ of P(n) = λ⁻ⁿ: the root above 1 of Σ λ⁻ⁿ = 1 over n = 3..11; 2 to the capacity, 0.5418 bit
@@ -120,15 +120,13 @@ def _disc(
 ) -> HeightField:
     """Check the parameters (see `cd`), and draw a patch of a disc."""
     name = disc.name
-    size = length_pair(extent, f"{name}: extent", 4.0, 500.0)
-    nx, ny = count_pair(pixels, f"{name}: pixels", 8, 4096)
+    size, (ny, nx), seeds = grid(name, extent, pixels, seed, (4.0, 500.0), 4096)
     full = number_between(depth, f"{name}: depth", 0.0, 10.0, " µm")
     # pits of tracks that are closer than 1.2 widths would merge
     least = 1.2 * disc.width
     pitch = number_between(track_pitch, f"{name}: track_pitch", least, size[1] / 2, " µm")
     amount = number_between(irregularity, f"{name}: irregularity", 0.0, 3.0)
-    streams = np.random.SeedSequence(seed_of(seed, f"{name}: seed")).spawn(2)
-    data, texture = (np.random.default_rng(stream) for stream in streams)
+    data, texture = map(np.random.default_rng, seeds.spawn(2))
     tracks = round(size[1] / pitch)
     x = np.arange(nx, dtype=np.float64) * (size[0] / nx)
     drawn = [_track(data, disc, size[0], x, amount) for _ in range(tracks)]
@@ -139,7 +137,7 @@ def _disc(
     outside = np.hypot(ahead[track], across) - half[track]
     relief = ramp(-disc.slope / 2, disc.slope / 2, outside)
     heights = full * relief + amount * disc.roughness * grain(texture, size, (ny, nx), (0.05, 0.05))
-    return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name=name)
+    return patch(name, heights, size)
 
 
 def _track(

@@ -54,7 +54,7 @@ def sinusoidal(
     rows
         Samples along the grooves; by default the patch is square.
     """
-    n = _samples(pixels_per_period, "sinusoidal")
+    n = count_between(pixels_per_period, "sinusoidal: pixels_per_period", 2, 65536)
     profile = 0.5 + 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
     return _grating("sinusoidal", profile, period, depth, axis, periods, rows)
 
@@ -75,7 +75,7 @@ def blazed(
     too, so the slope is depth/period. Parameters and errors as in `sinusoidal`; `depth` is the
     height of the ideal tooth, of which (N − 1)/N is sampled.
     """
-    n = _samples(pixels_per_period, "blazed")
+    n = count_between(pixels_per_period, "blazed: pixels_per_period", 2, 65536)
     check_choice("blazed: direction", direction, ("descending", "ascending"))
     profile = np.arange(n) / n
     if direction == "descending":
@@ -97,7 +97,7 @@ def lamellar(
 
     Parameters and errors as in `sinusoidal`; `duty` must leave at least one pixel high and one low.
     """
-    n = _samples(pixels_per_period, "lamellar")
+    n = count_between(pixels_per_period, "lamellar: pixels_per_period", 2, 65536)
     high = round(number_between(duty, "lamellar: duty", 0, 1) * n)
     if not 1 <= high <= n - 1:
         raise DiffractionError(
@@ -133,8 +133,3 @@ def _grating(
     heights = np.broadcast_to(line, (across, along))
     heights = heights if axis == "x" else heights.T
     return HeightField(heights, pixel, name=name, periodic=True)
-
-
-def _samples(pixels_per_period: int, kind: str) -> int:
-    """Check the number of samples per period."""
-    return count_between(pixels_per_period, f"{kind}: pixels_per_period", 2, 65536)

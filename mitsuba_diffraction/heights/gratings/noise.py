@@ -1,19 +1,63 @@
-"""Periodic random fields: the irregular part of a natural surface."""
+"""Periodic random fields: the irregular part of a natural surface, and their patches."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy
 
 from ...arrays import Real
+from ...errors import DiffractionError, quoted
+from ..field import HeightField
+from ..lengths import count_between, number_between
 
 Rng = np.random.Generator
 #: Lengths along x and y, µm.
 Pair = tuple[float, float]
 #: Numbers of pixels (ny, nx).
 Shape = tuple[int, int]
+#: One value for both axes, or a pair (along x, along y).
+Lengths = float | Sequence[float]
+Counts = int | Sequence[int]
+
+
+def grid(
+    name: str, extent: Lengths, pixels: Counts, seed: int, ends: Pair, most: int = 8192
+) -> tuple[Pair, Shape, np.random.SeedSequence]:
+    """Check the size, the number of pixels and the seed of a patch, as users write them.
+
+    name : of the generator, in errors.
+    ends : shortest and longest side, µm.
+    most : pixels along a side.
+
+    Raises a DiffractionError if one is out of its range.
+
+    Returns
+    -------
+    size, shape, seeds
+        (Lx, Ly) in µm, (ny, nx), and the source of random streams.
+    """
+    sides = [
+        number_between(v, f"{name}: extent", *ends, " µm") for v in _pair(extent, f"{name}: extent")
+    ]
+    counts = [
+        count_between(v, f"{name}: pixels", 8, most) for v in _pair(pixels, f"{name}: pixels")
+    ]
+    seeds = np.random.SeedSequence(count_between(seed, f"{name}: seed", 0, 2**63 - 1))
+    return (sides[0], sides[1]), (counts[1], counts[0]), seeds
+
+
+def _pair(value: Any, where: str) -> Sequence[Any]:
+    """Return both elements of a pair, or a single value twice; the values are not checked."""
+    pair = value if isinstance(value, list | tuple) else (value, value)
+    if len(pair) != 2:
+        raise DiffractionError(
+            f"{where}: expected one number or a pair (along x, along y), got {quoted(value)}"
+        )
+    return pair
 
 
 def smooth_field(
@@ -73,10 +117,13 @@ def _filtered_variance(sigma: float, n: int) -> float:
     return float((impulse**2).sum())
 
 
-def rounded(heights: Real) -> Real:
-    """Round heights in µm towards 0 to about a picometre: equal heights on every processor.
+def patch(name: str, heights: Real, size: Pair, *, periodic: bool = False) -> HeightField:
+    """Return a patch; heights in µm are rounded towards 0 to about a picometre.
+
+    Heights are then equal on every processor.
 
     Processors differ in the last bits of sines. A height that lies within them of a rounding step
     still differs, about one in ten billion.
     """
-    return np.trunc(heights * 2.0**20) * 2.0**-20
+    (ny, nx), even = heights.shape, np.trunc(heights * 2.0**20) * 2.0**-20
+    return HeightField(even, (size[0] / nx, size[1] / ny), name=name, periodic=periodic)

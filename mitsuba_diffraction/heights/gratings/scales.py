@@ -17,9 +17,20 @@ import scipy
 
 from ...arrays import Real
 from ..field import HeightField
-from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
+from ..lengths import number_between
 from .fingers import Blade, FingerRow, Layout, lay_out, overlay, ramp
-from .noise import Pair, Rng, Shape, grain, rounded, sample_field, smooth_field
+from .noise import (
+    Counts,
+    Lengths,
+    Pair,
+    Rng,
+    Shape,
+    grain,
+    grid,
+    patch,
+    sample_field,
+    smooth_field,
+)
 
 # Grid spacing of creases and bends, µm, independent of the pixels.
 _COARSE = 0.3
@@ -159,8 +170,7 @@ def _patch(
 ) -> HeightField:
     """Check the parameters (see `elaphe_like`), and draw a patch of a species."""
     generator = species.name
-    size = length_pair(extent, f"{generator}: extent", 2.0, 500.0)
-    nx, ny = count_pair(pixels, f"{generator}: pixels", 8, 8192)
+    size, shape, seeds = grid(generator, extent, pixels, seed, (2.0, 500.0))
     full = number_between(depth, f"{generator}: depth", 0.0, 10.0, " µm")
     names = ("irregularity", "bending", "roughness", "dirt")
     irregularity, bending, roughness, dirt = (
@@ -168,9 +178,7 @@ def _patch(
         for name, value in zip(names, amounts, strict=True)
     )
     # one random stream per structure, so that leaving one out does not change the others
-    streams = np.random.SeedSequence(seed_of(seed, f"{generator}: seed")).spawn(7)
-    rngs = [np.random.default_rng(stream) for stream in streams]
-    shape = ny, nx
+    rngs = [np.random.default_rng(stream) for stream in seeds.spawn(7)]
     rows = lay_out(rngs[0], size, species.layout.scaled(irregularity))
     heights = _surface(rngs[1], size, shape, rows, species, roughness)
     heights += bending * _bent(rngs[2], size, shape, species)
@@ -180,7 +188,7 @@ def _patch(
     heights += scratches(rngs[6], size, shape, dirt * species.scratches)
     heights -= heights.mean()
     heights = full * np.clip(species.level + heights / species.depth, 0.0, 1.0)
-    return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name=generator)
+    return patch(generator, heights, size)
 
 
 def _surface(

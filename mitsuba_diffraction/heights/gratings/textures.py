@@ -9,8 +9,8 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ..field import HeightField
-from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
-from .noise import grain, rounded
+from ..lengths import number_between
+from .noise import Counts, Lengths, grain, grid, patch
 
 
 def brushed(
@@ -46,21 +46,19 @@ def brushed(
     period
         Mean distance of lines, µm, adjusted so that whole numbers of them fit; None for no period.
     """
-    size = length_pair(extent, "brushed: extent", 4.0, 500.0)
-    nx, ny = count_pair(pixels, "brushed: pixels", 8, 8192)
+    size, (ny, nx), seeds = grid("brushed", extent, pixels, seed, (4.0, 500.0))
     amplitude = number_between(rms, "brushed: rms", 0.0, 2.0, " µm")
     least = 4.0 * size[0] / nx if period is None else 0.0
     across = number_between(width, "brushed: width", least, size[0] / 4, " µm")
     along = number_between(length, "brushed: length", 0.0, size[1] / 4, " µm")
-    rng = np.random.default_rng(seed_of(seed, "brushed: seed"))
+    rng = np.random.default_rng(seeds)
     heights = grain(rng, size, (ny, nx), (across, along))
     if period is not None:
         distance = number_between(period, "brushed: period", 4 * size[0] / nx, size[0] / 4, " µm")
         phase = 2 * np.pi * round(size[0] / distance) * np.arange(nx) / nx
         other = grain(rng, size, (ny, nx), (across, along))
         heights = heights * np.cos(phase) + other * np.sin(phase)
-    heights = amplitude * (heights - heights.mean())
-    return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name="brushed")
+    return patch("brushed", amplitude * (heights - heights.mean()), size)
 
 
 def rough(
@@ -100,12 +98,11 @@ def rough(
     band
         Shortest and longest spatial wavelength, µm; by default all of the patch.
     """
-    size = length_pair(extent, "rough: extent", 1.0, 5000.0)
-    nx, ny = count_pair(pixels, "rough: pixels", 8, 8192)
+    size, (ny, nx), seeds = grid("rough", extent, pixels, seed, (1.0, 5000.0))
     height = number_between(rms, "rough: rms", 0.0, 2.0, " µm")
     length = number_between(correlation, "rough: correlation", 1e-3, 1e6, " µm")
     exponent = number_between(slope, "rough: slope", 0.1, 6.0)
-    rng = np.random.default_rng(seed_of(seed, "rough: seed"))
+    rng = np.random.default_rng(seeds)
     fx = np.fft.rfftfreq(nx, size[0] / nx)
     fy = np.fft.fftfreq(ny, size[1] / ny)[:, None]
     frequency = np.hypot(fx, fy)
@@ -121,5 +118,4 @@ def rough(
             )
     heights = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((ny, nx))) * amplitude, (ny, nx))
     heights *= height / max(float(heights.std()), 1e-300)
-    pixel = size[0] / nx, size[1] / ny
-    return HeightField(rounded(heights), pixel, name="rough", periodic=True)
+    return patch("rough", heights, size, periodic=True)

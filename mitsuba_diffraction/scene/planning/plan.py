@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import DiffractionError
-from ...heights import Recipe
+from ...heights import Source
 from ...settings import RECIPE_SETTINGS, TableSettings
 from ...tables import DiffractionTable, TableRequest, providing
 from .light import Load, TableLight
@@ -98,15 +98,15 @@ def quantiles(values: Any, light: Any, shares: Sequence[float]) -> list[float]:
     return list(map(float, found))
 
 
-def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
+def recipe_of(planned: PlannedTable, scene: str) -> tuple[Source, str]:
     """The recipe of a limited table, with a comment on its purpose.
 
     Raises a DiffractionError if the heights come from no file.
     """
     light, settings = planned.light, planned.settings
-    recipe = light.request.source.as_recipe()
+    source = light.request.source
     surfaces = ", ".join(light.surfaces)
-    if recipe is None or settings is None:
+    if source.path is None or settings is None:
         raise DiffractionError(
             f"the heights of {surfaces} are an array, which no recipe can name; save them to a file"
         )
@@ -118,7 +118,7 @@ def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
         "that its camera sees of them lies beyond these limits, and is missing. Plan again when\n"
         "camera or lights change."
     )
-    return replace(recipe, table=table), comment
+    return replace(source, settings=table), comment
 
 
 def recipe_files(output: Path, count: int) -> list[Path]:
@@ -143,13 +143,12 @@ def load_by_recipes(load: Load, files: Sequence[Path]) -> Any:
 
     Raises a DiffractionError if a recipe is for other heights or other settings than the scene's.
     """
-    recipes = {file: Recipe.load(file) for file in files}
+    recipes = {file: Source.of(file) for file in files}
     used = set()
 
     def table_of(request: TableRequest) -> DiffractionTable:
-        named = request.source.as_recipe()
         for file, recipe in recipes.items():
-            if named is not None and recipe.describes_heights_of(named):
+            if recipe.digest == request.source.digest:
                 used.add(file)
                 return request.cached(_limited(request, recipe))
         return request.cached(request.settings)
@@ -163,8 +162,8 @@ def load_by_recipes(load: Load, files: Sequence[Path]) -> Any:
     return scene
 
 
-def _limited(request: TableRequest, recipe: Recipe) -> TableSettings:
-    settings = TableSettings(**recipe.table)
+def _limited(request: TableRequest, recipe: Source) -> TableSettings:
+    settings = TableSettings(**recipe.settings)
     for name in RECIPE_SETTINGS:
         planned, asked = getattr(settings, name), getattr(request.settings, name)
         if name not in CHOSEN and planned != asked:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.heights import Recipe
+from mitsuba_diffraction.heights import Source
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 
@@ -79,7 +79,7 @@ def test_tables_of_heights_name_the_command_instead(tmp_path):
     file = tmp_path / "groove.toml"
     file.write_text(text_of(RECIPE, ARGUMENTS))
     command = f"the command 'solve {file}'"
-    for load in (Recipe.load, OrderTable.load):
+    for load in (Source.of, OrderTable.load):
         with pytest.raises(DiffractionError, match=command):
             load(file)
 

@@ -10,7 +10,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.heights import Recipe
+from mitsuba_diffraction.heights import Source
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.scene.planning.light import (
     BINS,
@@ -246,8 +246,8 @@ def test_a_recipe_builds_the_planned_table_again(file, tmp_path, coherence):
     (output,) = recipe_files(tmp_path / "foil.toml", 1)
     recipe, comment = recipe_of(planned, "plate.xml")
     recipe.save(output, comment)
-    again = Recipe.load(output)
-    built = md.DiffractionTable.build(md.HeightField.load(output), **again.table)
+    again = Source.of(output)
+    built = md.DiffractionTable.build(md.HeightField.load(output), **again.settings)
     np.testing.assert_array_equal(built.coefficients, planned.table.coefficients)
     assert built.frequency_limit == planned.table.frequency_limit
     (table,) = tables_of(load_by_recipes(lambda: from_file(file, coherence=coherence), [output]))
@@ -264,7 +264,7 @@ def test_a_recipe_builds_the_planned_table_again(file, tmp_path, coherence):
     ],
 )
 def test_recipes_for_another_scene_are_refused(file, tmp_path, recipe, parameters, says):
-    np.save(file.with_name("other.npy"), PATCH.heights)
+    np.save(file.with_name("other.npy"), 0.5 * PATCH.heights)
     limited = tmp_path / "limited.toml"
     limited.write_text(
         f'source = "{file.with_name(recipe)}"\npixel_size = 0.3\ncoherence_width = 18\n'
