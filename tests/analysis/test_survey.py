@@ -19,6 +19,7 @@ from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_re
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
 from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
+from tests.analysis.perfect import perfect
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -217,7 +218,7 @@ def test_chance_explains_an_unordered_surface_and_not_a_grating():
     light = LightDirection(30.0, 0.0)
     for field, above in ((rough, 1.25), (grating, 1.3)):
         table = DiffractionTable.build(field, coherence_width=10.0, tolerance=0.01)
-        diffracted, chance = light_and_chance(table, light)
+        diffracted, chance = light_and_chance(table, light, perfect(light))
         index = diffracted.iridescence()
         # chance differs by some 10 % from patch to patch
         assert (index > above * chance) == (field is grating), (index, chance)
@@ -231,7 +232,8 @@ def test_a_grating_ranks_alike_at_any_angle_and_number_of_periods():
         waves = np.sin(2 * np.pi * periods / 10.24 * (c * x + s * x[:, None]))
         field = HeightField(0.015 * waves, 0.08, cut_out=True)
         table = DiffractionTable.build(field, tolerance=0.01)
-        diffracted, chance = light_and_chance(table, LightDirection(30.0, turn))
+        light = LightDirection(30.0, turn)
+        diffracted, chance = light_and_chance(table, light, perfect(light))
         index = diffracted.iridescence()
         # a grating's own leakage around its lobes is no unordered surface
         assert chance < 0.1 * index, (periods, turn)

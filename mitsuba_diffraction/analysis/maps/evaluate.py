@@ -129,9 +129,7 @@ def check_variant(bands: Bands, illuminant: str, spectral: bool) -> None:
 
 def check_map(bands: Bands, resolution: int, samples: int | None, spectral: bool) -> None:
     """Refuse numbers of pixels, samples and bands that are out of range or need too much memory."""
-    hemisphere.check_resolution(resolution)
-    if samples is not None:
-        hemisphere.check_samples(samples)
+    hemisphere.check_pixels(resolution, samples)
     if spectral and resolution**2 * bands.count > _MOST_NUMBERS:
         raise DiffractionError(
             f"a spectral map of {resolution}² pixels and {bands.count} bands requires "
