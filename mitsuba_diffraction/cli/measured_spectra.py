@@ -15,7 +15,7 @@ from ..analysis.media import follow, in_medium, loaded_in_media, medium_index, o
 from ..analysis.scans import bsdf_of, table_of
 from ..analysis.spectra import Spectra, spectrum, table_range
 from ..analysis.spectrometer import MeasurementGeometry
-from ..analysis.treatments import Treatment, load_treatments, treatment_for
+from ..analysis.treatments import Treatment, load_treatments
 from ..errors import DiffractionError, counted
 from ..files import FileKind
 from ..heights import dominant_periods, stands_in_full
@@ -54,8 +54,8 @@ class Measurement:
         """
         from ..orders.file import load_orders
 
-        found = treatment_for(file, load_treatments(self.args.treatments))
-        treatment = found.updated(Treatment(options.load_options(self.args)))
+        asked = Treatment(options.load_options(self.args))
+        treatment = load_treatments(self.args.treatments, asked)(file)
         source = TableSource.of(file, treatment.options)
         if source.kind is FileKind.ORDERS:
             return [self._of_table(load_orders(file), file)]

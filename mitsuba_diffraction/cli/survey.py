@@ -112,7 +112,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
 
     from ..analysis.survey import run_survey
 
-    treatments = load_treatments(args.treatments)
+    treatment = load_treatments(args.treatments, Treatment(own_options, settings))
     variant = set_variant(args.mode or "llvm_ad_rgb")
     check_surface(surface_parameters(args))
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
@@ -121,8 +121,7 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
             say_files(_read_by(args.files))
         bar = stack.enter_context(Bar(args, unit=" scans", delay=0))
         return run_survey(
-            args.files, args.output, treatments=treatments,
-            common=Treatment(own_options, settings), variant=variant, theta=args.theta,
+            args.files, args.output, treatment=treatment, variant=variant, theta=args.theta,
             resolution=args.resolution, threads=worker_threads(args), repeats=args.repeats,
             surface=surface_parameters(args), crops=args.crops,
             client=client, progress=bar,
