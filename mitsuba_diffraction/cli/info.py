@@ -12,7 +12,7 @@ import mitsuba as mi
 from ..errors import DiffractionError
 from ..files import GLTF, MESHES, FileKind
 from ..gltf import materials_of
-from ..heights import HeightField, Recipe, Source, jumping_lines
+from ..heights import HeightField, Source, jumping_lines
 from ..heights.coherence import resolved, width_reason
 from ..heights.formats.catalogue import sections
 from ..heights.spectra import LEAST_SHARE, examine_periods
@@ -20,9 +20,9 @@ from ..images import save_figure
 from ..settings import TableSettings
 from ..tables import DiffractionTable
 from . import options
-from .console import Bar, flagged, mitsuba_warnings
-from .options import path_ending_in
+from .console import Bar, flagged
 from .report import STDOUT, Figures, lines_of, plain
+from .values import path_ending_in
 
 # What `render MESH` and `tangents` do with a mesh without normals
 _SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV edges stay"
@@ -87,7 +87,8 @@ def run(args: argparse.Namespace) -> Figures:
 
         save_figure(args.picture, patches_figure(source.fields()), dpi=80)
         data["picture"] = str(args.picture)
-    data |= {name: list(map(flagged, data[name])) for name in ("warnings",) if name in data}
+    if "warnings" in data:
+        data["warnings"] = list(map(flagged, data["warnings"]))
     if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -113,8 +114,6 @@ def _formats(args: argparse.Namespace) -> Figures:
 
 def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     file, kind = args.file, source.kind
-    if source.recipe is not None:
-        return _recipe(source, source.recipe, args)
     if kind is FileKind.SCENE:
         raise DiffractionError(
             f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
@@ -133,17 +132,26 @@ def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
-    field = source.field()
-    settings = TableSettings(**options.table_options(args))
-    warnings = options.table_warnings([field], settings)
-    suggested = (jumping_lines(field),)
+    """Describe a file of heights, or a recipe."""
+    fields = source.fields()
+    settings = TableSettings(**{**source.settings, **options.table_options(args)})
+    patches = [{**field.summary(), **_periods(field)} for field in fields]
+    window = width_reason(resolved(settings, fields), fields)
+    warnings = options.table_warnings(fields, settings)
+    if (recipe := source.recipe) is None:
+        warnings += filter(None, [jumping_lines(fields[0])])
+        return {"kind": "height field", **patches[0], "window": window, "warnings": warnings,
+                "limits": options.LIMITS}  # fmt: skip
     return {
-        "kind": "height field",
-        **field.summary(),
-        **_periods(field),
-        "window": width_reason(resolved(settings, [field]), [field]),
-        "warnings": [*warnings, *filter(None, suggested)],
-        "limits": options.LIMITS,
+        "kind": "recipe",
+        **({"generator": recipe.generator} if recipe.generator else {}),
+        "options": recipe.options.specified(),
+        "table": source.settings,
+        "output": str(recipe.output),
+        "output exists": recipe.output.is_file(),
+        "patches": patches,
+        "window": window,
+        "warnings": warnings,
     }
 
 
@@ -156,22 +164,6 @@ def _periods(field: HeightField) -> dict[str, Any]:
     return described
 
 
-def _recipe(source: Source, recipe: Recipe, args: argparse.Namespace) -> dict[str, Any]:
-    fields = source.fields()
-    settings = TableSettings(**{**source.settings, **options.table_options(args)})
-    return {
-        "kind": "recipe",
-        **({"generator": recipe.generator} if recipe.generator else {}),
-        "options": recipe.options.specified(),
-        "table": source.settings,
-        "output": str(recipe.output),
-        "output exists": recipe.output.is_file(),
-        "patches": [{**field.summary(), **_periods(field)} for field in fields],
-        "window": width_reason(resolved(settings, fields), fields),
-        "warnings": options.table_warnings(fields, settings),
-    }
-
-
 def _mesh(file: Path) -> dict[str, Any]:
     from ..scene.fitted_mesh import fit_of
     from ..scene.orientation.mesh_files import read_mesh
@@ -179,9 +171,8 @@ def _mesh(file: Path) -> dict[str, Any]:
 
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
-    with mitsuba_warnings():
-        read = read_mesh(file)
-        mesh, report = read.mesh, check_tangents(read.mesh)
+    read = read_mesh(file)
+    mesh, report = read.mesh, check_tangents(read.mesh)
     materials = {}
     if file.suffix.lower() in GLTF:  # names that --preset and --assign take
         materials["materials"] = [each.name for each in materials_of(file)] or ["none"]

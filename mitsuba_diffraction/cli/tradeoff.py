@@ -29,8 +29,8 @@ from ..scene import set_variant
 from ..tables import DiffractionTable
 from . import options
 from .console import Bar
-from .options import number_between
 from .report import Figures, output_of, save_json
+from .values import number_between
 
 #: Pixels of the default patch along an axis, pairs of directions, calls in a kernel launch, timed
 #: launches, height scales.
