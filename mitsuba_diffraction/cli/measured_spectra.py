@@ -138,8 +138,8 @@ def known(
 ) -> Any:  # fmt: skip
     """Return the wavelengths (n,) within limits, nm; say that others are left out.
 
-    what : what has the limits, and a verb.
-    remedy : what to do beside giving other wavelengths.
+    what : name of the surface or material with the limits, and a verb, for messages.
+    remedy : what else to do than to give other wavelengths.
 
     Raises a DiffractionError if --wavelength-range names others, or none is left.
     """
