@@ -196,7 +196,7 @@ class MaterialFactor:
 
 
 def light_and_chance(
-    table: DiffractionTable, light: LightDirection, factor: Factor | None = None
+    table: DiffractionTable, light: LightDirection, factor: Factor
 ) -> tuple[DiffractedLight, float]:
     """Return the diffracted light, and the part of its index that chance explains.
 
@@ -205,7 +205,7 @@ def light_and_chance(
     exponentially distributed. The index is a root mean square over the light, so that chance has a
     part in it by its share of the luminance: a grating's lobes are above the median and have none.
 
-    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
+    factor : of the surface's material (`MaterialFactor.at`).
     """
     last = table.grid.last
     shape = (2 * last[1] + 1, 2 * last[0] + 1)
@@ -223,7 +223,7 @@ def light_and_chance(
 def diffracted_light(
     table: DiffractionTable,
     light: LightDirection,
-    factor: Factor | None = None,
+    factor: Factor,
     speckles: Sequence[Real] = (),
 ) -> list[DiffractedLight]:
     """Collect the orders of a table by direction, in daylight (D65).
@@ -240,7 +240,7 @@ def diffracted_light(
     Parameters
     ----------
     table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
-    factor : of the surface's material (`MaterialFactor.at`); R = 1 without.
+    factor : of the surface's material (`MaterialFactor.at`).
     speckles : factors (2 ny + 1, 2 nx + 1) on the median power of all orders at a frequency, in
         place of the powers.
     """
@@ -278,11 +278,8 @@ def diffracted_light(
         rows, columns = np.nonzero(z2 > 0.0)
         sines = np.stack([x[columns], y[rows]], axis=-1)
         cosine = np.sqrt(z2[rows, columns])
-        w, reflected = light.direction[2] + cosine, np.ones(1)
-        r_0, w_0 = np.ones(1), np.array([2.0 * light.direction[2]])
-        if factor is not None:
-            reflected, w = factor(sines, float(wavelength))
-            r_0, w_0 = factor(light.mirror[None, :2], float(wavelength))
+        reflected, w = factor(sines, float(wavelength))
+        r_0, w_0 = factor(light.mirror[None, :2], float(wavelength))
         node = np.minimum(np.round(k * w * (_NODES / expansion.kappa_max)).astype(int), _NODES)
         terms = coefficients[intervals[node], rows, columns]
         power = np.einsum("nt,nt->n", terms, factors[node]).astype(np.float64)

@@ -38,15 +38,14 @@ def known_range(material: str | None, pigment: str | None = None) -> tuple[float
 
 def check_material(material: str | None, wavelengths: Real, pigment: str | None = None) -> None:
     """Refuse wavelengths (n,) in nm at which a material, or a pigment beneath it, is unknown."""
-    known_range(material, pigment)
-    of_each = {f"material='{material}'": known_range(material)}
-    of_each[f"pigment='{pigment}'"] = known_range(None, pigment)
-    for name, limits in of_each.items():
-        if not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
-            raise DiffractionError(
-                f"{name} is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
-                f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others"
-            )
+    first, last = known_range(material, pigment)
+    if not first <= wavelengths.min() <= wavelengths.max() <= last:
+        given = {"material": material, "pigment": pigment}
+        names = " with ".join(f"{k}='{v}'" for k, v in given.items() if v is not None)
+        raise DiffractionError(
+            f"{names} is known from {first:.4g} to {last:.4g} nm, and the wavelengths are "
+            f"{wavelengths.min():g} to {wavelengths.max():g} nm; give others"
+        )
 
 
 def check_lit(surface: Surface, wavelengths: Real, theta: ArrayLike, phi: ArrayLike) -> None:

@@ -35,14 +35,7 @@ from ..progress import Progress, silent
 from .known_wavelengths import check_lit, check_material, known_range
 from .maps.evaluate import opaque
 from .maps.hemisphere import flat_interaction, vectors
-from .spectrometer import (
-    MeasurementGeometry,
-    across_plane,
-    column_name,
-    cone,
-    light_direction,
-    lobe_width,
-)
+from .spectrometer import MeasurementGeometry, column_name, lobe_width
 
 #: What spectra are relative to: a white standard, a perfect mirror at its own angle, or the light
 #: that falls on the surface.
@@ -240,10 +233,10 @@ def _signals(
     parts, done = [], 0
     while done < count:
         progress(done, count, "detectors")
-        cones = [cone(geometry, geometry.detectors[done], lobe)]
+        cones = [geometry.cone(geometry.detectors[done], lobe)]
         together = max(_NODES_AT_ONCE // len(cones[0][1]), 1)
         following = geometry.detectors[done + 1 : done + together]
-        cones += [cone(geometry, angle, lobe) for angle in following]
+        cones += [geometry.cone(angle, lobe) for angle in following]
         parts.append(_integrals(bsdf, geometry, lam, before, cones))
         done += len(cones)
     progress(count, count, "detectors")
@@ -262,13 +255,13 @@ def _integrals(
     The detector is Mitsuba's camera and the lamp its emitter: `eval` has the lamp's cosine, and its
     Mueller matrix is for light that goes from the lamp to the detector.
     """
-    light = light_direction(geometry)
+    light = geometry.lamp
     directions, weights = map(np.concatenate, zip(*cones, strict=True))
     view = vectors(directions)
     si = flat_interaction(view, len(directions))
     towards = mi.Vector3f(opaque(light))
     turned = (weights * directions[:, 2] / light[2]).reshape(len(cones), -1)
-    stokes = _stokes(light, across_plane(geometry))
+    stokes = _stokes(light, geometry.across)
     context, channels = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
     packet = channels if before is None else 1
     sums = np.zeros((3 if mi.is_polarized else 1, lam.size, len(cones)))
@@ -305,8 +298,8 @@ def _of_mirror(sigma: float | None, geometry: MeasurementGeometry, lam: Real) ->
     """
     if sigma is None:
         return np.ones((lam.size, 1))
-    directions, solid = cone(geometry, geometry.light, lobe_width(sigma, lam))
-    light = light_direction(geometry)
+    directions, solid = geometry.cone(geometry.light, lobe_width(sigma, lam))
+    light = geometry.lamp
     squares = np.square(directions[:, :2] + light[:2]).sum(axis=1)
     weights = (solid * directions[:, 2])[:, None]
     level_i, level_o = sigma * light[2] ** 2, sigma * directions[:, 2] ** 2

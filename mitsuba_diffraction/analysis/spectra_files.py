@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from ..errors import DiffractionError
 from ..optics.colour import encode_srgb
 from .angular_variables import VARIABLES
 from .observers import Eye, contrasts, luminance_contrasts, noises, quantum_catches
-from .spectra import Spectra
+from .spectra import Spectra, mean_spectra
 from .spectral_variables import colours_of, daylit
 
 #: Fewest detectors from which on a map of angle and wavelength is drawn beside curves.
@@ -42,8 +41,8 @@ _STYLES = ("-", "--", "-.", ":")
 Groups = Mapping[str, Spectra]
 
 
-def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, list[Spectra]]:
-    """Return the spectra at their common wavelengths."""
+def means_of(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, Spectra]:
+    """Return the mean of the spectra of each group, at the wavelengths that all have."""
     every = [each for members in groups.values() for each in members]
     common = functools.reduce(np.intersect1d, [each.wavelength for each in every])
     if not common.size:
@@ -51,30 +50,33 @@ def on_common_wavelengths(groups: Mapping[str, Sequence[Spectra]]) -> dict[str, 
 
     def cut(each: Spectra) -> Spectra:
         kept = np.isin(each.wavelength, common)
-        s, p, error = (None if x is None else x[kept] for x in (each.s, each.p, each.error))
-        value = each.value[kept]
-        return replace(each, wavelength=common, value=value, s=s, p=p, error=error)
+        s, p = (None if x is None else x[kept] for x in (each.s, each.p))
+        return replace(each, wavelength=common, value=each.value[kept], s=s, p=p)
 
-    return {name: [cut(each) for each in members] for name, members in groups.items()}
-
-
-def save_csv(groups: Groups, path: str | os.PathLike[str]) -> None:
-    """Write spectra as the R package pavo reads them: `wl` in nm, then one column each, per cent.
-
-    Without comments or units, which `read.csv` would take for data.
-    """
-    columns = {k: v for name, each in groups.items() for k, v in each.columns(name).items()}
-    _write(path, next(iter(groups.values())).wavelength, columns)
+    return {name: mean_spectra([*map(cut, members)]) for name, members in groups.items()}
 
 
-def save_errors(groups: Groups, path: str | os.PathLike[str]) -> None:
-    """Write the standard errors of means, in the columns of `save_csv`, per cent."""
-    columns = {
+def columns_of(groups: Groups) -> dict[str, Real]:
+    """Return the spectra of all groups by name."""
+    return {k: v for name, each in groups.items() for k, v in each.columns(name).items()}
+
+
+def errors_of(groups: Groups) -> dict[str, Real]:
+    """Return the standard errors of means by the names of `columns_of`."""
+    return {
         name: values
         for group, each in groups.items() if each.error is not None
         for name, values in zip(each.names(group), each.error.T, strict=True)
     }  # fmt: skip
-    _write(path, next(iter(groups.values())).wavelength, columns)
+
+
+def save_csv(path: Path, wavelength: Real, columns: Mapping[str, Real]) -> None:
+    """Write spectra as the R package pavo reads them: `wl` in nm, then one column each, per cent.
+
+    Without comments or units, which `read.csv` would take for data.
+    """
+    rows = np.column_stack([wavelength, *(100.0 * each for each in columns.values())])
+    save_rows(path, ["wl", *columns], rows, digits=6)
 
 
 def save_colours(groups: Groups, path: Any) -> None:
@@ -123,11 +125,6 @@ def save_catches(
     save_rows(contrasts_path, columns, pairs, digits=6)
 
 
-def _write(path: str | os.PathLike[str], wavelength: Real, columns: dict[str, Real]) -> None:
-    rows = np.column_stack([wavelength, *(100.0 * each for each in columns.values())])
-    save_rows(Path(path), ["wl", *columns], rows, digits=6)
-
-
 def colour_of(spectra: Spectra) -> Real:
     """Return the colour of each spectrum in daylight, (detectors, 3) sRGB, as dark as ink."""
     linear = daylit(spectra)
@@ -136,7 +133,7 @@ def colour_of(spectra: Spectra) -> Real:
 
 
 def spectra_figure(
-    groups: Groups | Spectra, title: str = "", azimuth: str = "",
+    groups: Groups, title: str = "", azimuth: str = "",
     measured: tuple[Real, Real] | None = None,
 ) -> Figure:  # fmt: skip
     """Draw spectra over wavelength, with bands of one standard error.
@@ -147,8 +144,6 @@ def spectra_figure(
     azimuth : of the lamp in words, where the scans of a mean have several.
     measured : wavelengths, nm, and values (n,) of a curve to draw in black beside.
     """
-    if isinstance(groups, Spectra):
-        groups = {"": groups}
     first = next(iter(groups.values()))
     geometry = first.geometry
     mapped = len(geometry.detectors) >= MAPPED and first.wavelength.size > 1

@@ -74,6 +74,51 @@ class MeasurementGeometry:
             f"light{self.light:g}_detector{angle:g}".replace("-", "m") for angle in self.detectors
         )
 
+    @property
+    def lamp(self) -> Real:
+        """Unit vector (3,) towards the lamp."""
+        return self.towards(-self.light)
+
+    @property
+    def across(self) -> Real:
+        """Unit vector (3,) normal to the plane of incidence: s."""
+        phi = math.radians(self.azimuth)
+        return np.array([-math.sin(phi), math.cos(phi), 0.0])
+
+    def towards(self, angle: float) -> Real:
+        """Return the unit vector (3,) at a detector's angle in the plane of incidence."""
+        return polar(math.radians(-angle), math.radians(self.azimuth))
+
+    def cone(self, angle: float, lobe: float) -> tuple[Real, Real]:
+        """Return directions (m, 3) in a detector's cone and their solid angles (m,).
+
+        Gauss and Legendre's nodes in the angle from the axis, even ones around it: the cone's edge
+        is sharp, and lobes inside are smooth.
+        """
+        half = math.radians(0.5 * self.acceptance)
+        radii = max(math.ceil(_PER_LOBE * half / lobe), _FEWEST_RADII)
+        around = max(math.ceil(_PER_LOBE * 2.0 * math.pi * half / lobe), _FEWEST_AZIMUTHS)
+        if radii * around > _MOST_NODES:
+            narrower = self.acceptance * math.sqrt(_MOST_NODES / (radii * around))
+            raise DiffractionError(
+                f"acceptance={self.acceptance:g}: the lobes of so wide a coherence window are too "
+                f"fine to add up over this cone; take at most {0.99 * narrower:.2g} degrees"
+            )
+        nodes, weights = np.polynomial.legendre.leggauss(radii)
+        alpha = 0.5 * half * (nodes + 1.0)
+        psi = 2.0 * np.pi * (np.arange(around) + 0.5) / around
+        alpha, psi = (a.ravel() for a in np.meshgrid(alpha, psi, indexing="ij"))
+        axis = self.towards(angle)
+        side = self.across
+        along = np.cross(side, axis)
+        directions = (
+            np.cos(alpha)[:, None] * axis
+            + (np.sin(alpha) * np.cos(psi))[:, None] * along
+            + (np.sin(alpha) * np.sin(psi))[:, None] * side
+        )
+        solid = np.repeat(0.5 * half * weights, around) * np.sin(alpha) * 2.0 * np.pi / around
+        return directions, solid
+
 
 def column_name(group: str) -> str:
     """Return the name of a group in names of columns, as R keeps them."""
@@ -83,50 +128,3 @@ def column_name(group: str) -> str:
 def lobe_width(sigma: float | None, lam: Real) -> float:
     """Return the standard deviation of the narrowest lobe, rad: of exp(−σ²k²Δ²), 1/(√2 σk)."""
     return 0.05 if sigma is None else 1.0 / (2**0.5 * sigma * float(wavenumber(lam[0])))
-
-
-def light_direction(geometry: MeasurementGeometry) -> Real:
-    """Return the unit vector (3,) towards the lamp."""
-    return in_plane(geometry, -geometry.light)
-
-
-def in_plane(geometry: MeasurementGeometry, angle: float) -> Real:
-    """Return the unit vector (3,) at an angle in the plane of incidence, + away from the lamp."""
-    return polar(math.radians(-angle), math.radians(geometry.azimuth))
-
-
-def cone(geometry: MeasurementGeometry, angle: float, lobe: float) -> tuple[Real, Real]:
-    """Return directions (m, 3) in a detector's cone and their solid angles (m,).
-
-    Gauss and Legendre's nodes in the angle from the axis, even ones around it: the cone's edge is
-    sharp, and lobes inside are smooth.
-    """
-    half = math.radians(0.5 * geometry.acceptance)
-    radii = max(math.ceil(_PER_LOBE * half / lobe), _FEWEST_RADII)
-    around = max(math.ceil(_PER_LOBE * 2.0 * math.pi * half / lobe), _FEWEST_AZIMUTHS)
-    if radii * around > _MOST_NODES:
-        narrower = geometry.acceptance * math.sqrt(_MOST_NODES / (radii * around))
-        raise DiffractionError(
-            f"acceptance={geometry.acceptance:g}: the lobes of so wide a coherence window are too "
-            f"fine to add up over this cone; take at most {0.99 * narrower:.2g} degrees"
-        )
-    nodes, weights = np.polynomial.legendre.leggauss(radii)
-    alpha = 0.5 * half * (nodes + 1.0)
-    psi = 2.0 * np.pi * (np.arange(around) + 0.5) / around
-    alpha, psi = (a.ravel() for a in np.meshgrid(alpha, psi, indexing="ij"))
-    axis = in_plane(geometry, angle)
-    side = across_plane(geometry)
-    along = np.cross(side, axis)
-    directions = (
-        np.cos(alpha)[:, None] * axis
-        + (np.sin(alpha) * np.cos(psi))[:, None] * along
-        + (np.sin(alpha) * np.sin(psi))[:, None] * side
-    )
-    solid = np.repeat(0.5 * half * weights, around) * np.sin(alpha) * 2.0 * np.pi / around
-    return directions, solid
-
-
-def across_plane(geometry: MeasurementGeometry) -> Real:
-    """Return the unit vector (3,) normal to the plane of incidence: s."""
-    phi = math.radians(geometry.azimuth)
-    return np.array([-math.sin(phi), math.cos(phi), 0.0])

@@ -12,7 +12,7 @@ import math
 import tempfile
 import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,7 +24,7 @@ from PIL import Image
 from ..atomic import atomic_path, make_folder
 from ..cluster.jobs import WorkerCalls
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
-from ..digests import key_of
+from ..digests import key_of, sha256_of
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import FileKind, readable_file
 from ..heights import Source
@@ -41,8 +41,8 @@ from .maps.result import BrdfMap, LightDirection
 from .media import in_medium, optical_scale
 from .repeats import sample_of, scan_files, write_repeats
 from .scans import bsdf_of, table_of
-from .survey_files import FILES, SHEET, is_map, is_row, write_rows, write_sheets
-from .treatments import Treatment, treatment_for
+from .survey_files import FILES, SHEET, write_rows, write_sheets
+from .treatments import Treatment
 
 #: Version of the rows: raise it when their values change.
 VERSION = 12
@@ -209,8 +209,7 @@ def run_survey(
     files: Sequence[Path],
     folder: Path,
     *,
-    treatments: Sequence[tuple[str, Treatment]] = (),
-    common: Treatment | None = None,
+    treatment: Callable[[Path], Treatment] = lambda file: Treatment(),
     variant: str = "llvm_ad_rgb",
     theta: float = 30.0,
     resolution: int = 160,
@@ -235,8 +234,7 @@ def run_survey(
     ----------
     files : scans of any format, recipes, folders of them, or patterns as in "scans/*.spm".
     folder : folder of the survey, created if it does not exist.
-    treatments : treatments by patterns (`load_treatments`).
-    common : treatment of all files, which takes precedence.
+    treatment : returns a file's treatment, as `load_treatments` makes it.
     variant : variant of Mitsuba, RGB or spectral.
     theta : angle of the light from the normal, degrees, across the strongest grating's grooves.
     resolution : pixels a side of the maps.
@@ -259,48 +257,40 @@ def run_survey(
     scans = folder / SCANS
     make_folder(scans)
     shown = tuple((surface or {}).items())
-    named: list[dict[str, str]] = []
-    rows: dict[int, dict[str, Any]] = {}  # those that are known, by their place in `named`
-    jobs: dict[int, Job] = {}
+    rows: list[dict[str, Any]] = []  # without a reason until they are known
+    jobs: list[tuple[int, Job]] = []  # with the row's place
     for file in files:
         name = {"file": str(file), "sample": sample_of(file, repeats)}
         try:
-            treatment = treatment_for(file, treatments).updated(common or Treatment())
             of_scan = SceneFiles.from_scene(readable_file(file), {})
             Source.of(file)  # a recipe is checked
-            job = Job(of_scan, treatment, theta, resolution, variant, threads, shown)
+            job = Job(of_scan, treatment(file), theta, resolution, variant, threads, shown)
             parts = [job] if crops is None else _crops_of(job, file, crops)
         except DiffractionError as error:
-            rows[len(named)] = name | {"reason": str(error)}
-            named.append(name)
+            rows.append(name | {"reason": str(error)})
             continue
         for part in parts:
             stored = _stored_row(scans, part)
             if stored is None:
-                jobs[len(named)] = part
-            else:
-                rows[len(named)] = name | stored
-            named.append(name)
-    todo = list(jobs)
-    files_of_jobs = [Path(named[n]["file"]).name for n in todo]
-    progress(0, len(todo), _next(files_of_jobs, 0, client))
-    given = [jobs[n] for n in todo]
+                jobs.append((len(rows), part))
+            rows.append(name | (stored or {}))
+    names, given = [Path(rows[n]["file"]).name for n, _ in jobs], [job for _, job in jobs]
+    progress(0, len(jobs), _next(names, 0, client))
     results = enumerate(map(measure, given)) if calls is None else calls.answers(measure, given)
     for done, (which, result) in enumerate(results, 1):
-        n = todo[which]
+        n, job = jobs[which]
         if isinstance(result, Failed):
-            rows[n] = named[n] | {"reason": f"{result.text} {result.worker}".strip()}
+            rows[n]["reason"] = f"{result.text} {result.worker}".strip()
         else:
-            rows[n] = named[n] | _store(scans, Path(named[n]["file"]), jobs[n], result)
+            rows[n] |= _store(scans, Path(rows[n]["file"]), job, result)
         # complete even if Ctrl-C ends the next scan
-        write_rows(folder / TABLE, [rows[n] for n in sorted(rows)])
-        progress(done, len(todo), _next(files_of_jobs, done, client))
-    every = [rows[n] for n in sorted(rows)]
-    write_repeats(folder / SAMPLES, every)
-    ranking = ranked(every)
+        write_rows(folder / TABLE, [row for row in rows if "reason" in row])
+        progress(done, len(jobs), _next(names, done, client))
+    write_repeats(folder / SAMPLES, rows)
+    ranking = ranked(rows)
     write_rows(folder / TABLE, ranking)
     write_sheets(folder, ranking)
-    return every
+    return rows
 
 
 def _next(names: Sequence[str], done: int, client: Any) -> str:
@@ -338,32 +328,34 @@ def _crops_of(job: Job, file: Path, count: int) -> list[Job]:
 
 
 def _stored_row(scans: Path, job: Job) -> dict[str, Any] | None:
-    """Read the row that an earlier run has stored, if its files exist."""
+    """Read the row that an earlier run has stored, if neither row nor files have changed since."""
     try:
         (path,) = scans.glob(f"*-{job.key}.json")
-        row = json.loads(path.read_text("utf-8")) if path.is_file() else None
-    except (ValueError, RecursionError):  # no such file, or damaged
+        row, seal = json.loads(path.read_text("utf-8"))
+        return _with_files(row, path) if seal == _seal(row, path) else None
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):  # missing, or damaged
         return None
-    if not is_row(row):
-        return None
-    if row["reason"]:
-        return {**row}
-    files = {name: path.with_suffix(suffix) for suffix, name in FILES.items()}
-    whole = all(file.is_file() and not file.is_symlink() for file in files.values())
-    if not (whole and is_map(files["map"])):
-        return None
-    return {**row, **{name: f"{SCANS}/{file.name}" for name, file in files.items()}}
 
 
 def _store(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any]:
     """Write a scan's files, the row last; after unexpected errors no row: the next run retries."""
-    stem = f"{file.stem[:60]}-{job.key}"
-    row = dict(result.row)
+    path, row = scans / f"{file.stem[:60]}-{job.key}.json", result.row
     for suffix, content in result.files.items():
-        with atomic_path(scans / f"{stem}{suffix}") as temporary:
+        with atomic_path(path.with_suffix(suffix)) as temporary:
             temporary.write_bytes(content)
-        row[FILES[suffix]] = f"{SCANS}/{stem}{suffix}"
     if not row["reason"].startswith("unexpected"):
-        with atomic_path(scans / f"{stem}.json") as temporary:
-            temporary.write_text(json.dumps(row), "utf-8")
-    return row
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps([row, _seal(row, path)]), "utf-8")
+    return _with_files(row, path)
+
+
+def _seal(row: Mapping[str, Any], path: Path) -> str:
+    """Return a digest of a row and of its files, by which damage is found."""
+    files = [] if row["reason"] else [path.with_suffix(suffix) for suffix in FILES]
+    return key_of(row, *map(sha256_of, files))
+
+
+def _with_files(row: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Return a row with the names of its files, which lie beside its own."""
+    names = {name: f"{SCANS}/{path.with_suffix(suffix).name}" for suffix, name in FILES.items()}
+    return {**row, **({} if row["reason"] else names)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -15,9 +15,6 @@ from ..images import open_image, save_figure
 SHEET = "sheet"
 #: Columns of a scan's files by suffix.
 FILES = {".exr": "table", ".png": "map"}
-# Columns that are texts, and those that contact sheets and summaries need.
-_TEXTS = ("reason", "warnings", "surface", "tiling", "ranked_among", *FILES.values())
-_NEEDED = ("width_um", "iridescence", "iridescence_by_chance", "iridescent_light", "tiling")
 _COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
 
 
@@ -27,31 +24,6 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     first = ("file", "sample", "reason")
     names = [*first, *(name for name in columns if name not in first)]
     save_rows(path, names, rows)
-
-
-def is_row(row: object) -> TypeGuard[dict[str, Any]]:
-    """Say whether what a file holds is a row as `measure` makes them."""
-    if not (isinstance(row, dict) and isinstance(row.get("reason"), str)):
-        return False
-    for name, value in row.items():
-        if name in _TEXTS or value == "":
-            fits = isinstance(value, str)
-        else:
-            fits = isinstance(value, float) or (type(value) is int and abs(value) < 2**63)
-        if not fits:
-            return False
-    needed = _NEEDED + (("direction_1_deg",) if "period_1_um" in row else ())
-    return bool(row["reason"]) or all(name in row for name in needed)
-
-
-def is_map(file: Path) -> bool:
-    """Say whether a file is a picture that a contact sheet can show."""
-    try:
-        with open_image(file, ("PNG",)) as picture:
-            picture.load()
-    except (OSError, ValueError, SyntaxError):
-        return False
-    return True
 
 
 def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -14,8 +14,9 @@ override earlier ones. Keys are the keys of recipes.
 from __future__ import annotations
 
 import fnmatch
+import functools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -41,26 +42,27 @@ class Treatment:
 
 
 def load_treatments(
-    path: str | os.PathLike[str] | None,
-) -> Sequence[tuple[str, Treatment]]:
-    """Read patterns and their treatments from a TOML file, in its order; none if path is `None`.
+    path: str | os.PathLike[str] | None = None, common: Treatment | None = None
+) -> Callable[[Path], Treatment]:
+    """Return the function that gives a file's treatment, of all patterns that match its name.
+
+    path : TOML file of patterns, or None.
+    common : treatment of all files, which takes precedence.
 
     Raises a DiffractionError if the file cannot be read, or a pattern has an option without a valid
     value.
     """
-    if path is None:
-        return []
-    content = read_toml(path)
-    return [(pattern, _treatment(f"'{path}': [{pattern!r}]", v)) for pattern, v in content.items()]
+    content = {} if path is None else read_toml(path)
+    treatments = [(name, _treatment(f"'{path}': [{name!r}]", v)) for name, v in content.items()]
 
+    def of_file(file: Path) -> Treatment:
+        matching = (
+            treatment for name, treatment in treatments
+            if fnmatch.fnmatch(str(file), name) or fnmatch.fnmatch(file.name, name)
+        )  # fmt: skip
+        return functools.reduce(Treatment.updated, (*matching, common or Treatment()), Treatment())
 
-def treatment_for(file: Path, treatments: Sequence[tuple[str, Treatment]]) -> Treatment:
-    """Combine the treatments of the patterns that match a file."""
-    result = Treatment()
-    for pattern, treatment in treatments:
-        if fnmatch.fnmatch(str(file), pattern) or fnmatch.fnmatch(file.name, pattern):
-            result = result.updated(treatment)
-    return result
+    return of_file
 
 
 def _treatment(where: str, values: Any) -> Treatment:

@@ -27,7 +27,8 @@ realtime               `view` and `compare`, `export-viewer` and `export-shader`
 export_bsdf            a surface's BRDF for other programs
 export_osl             a surface as a shader for Blender's Cycles
 spellings              spellings of the version before: each still works, with one line
-options                options that several commands share, declared once, and their types
+options                options that several commands share, declared once
+values                 types of values on the command line
 arguments              files that a command line names, noted as inputs
 scene_options          the scene, its parameters and materials; a mesh on a stage; its rendering
 workers                options of commands that may run on many processes

@@ -32,9 +32,9 @@ from ..scene import set_variant
 from ..settings import TableSettings
 from ..thesis.methods import Gain, make, method_map
 from . import options
-from .console import Bar, mitsuba_warnings, say_warning
-from .options import number_between
+from .console import Bar, say_warning
 from .report import Figures, elapsed, exr_and_png, output_of
+from .values import STOPS, number_between, path_ending_in
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -150,7 +150,7 @@ def gain_of(args: argparse.Namespace) -> Any:
     "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
     *SURFACE_SOURCE,
     ("-o --output OUT", "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with "
-     "-map.exr in the current folder", options.path_ending_in(".exr", ".png")),
+     "-map.exr in the current folder", path_ending_in(".exr", ".png")),
     options.MODE,
     options.Group("the map", (
         *options.direction(),
@@ -161,7 +161,7 @@ def gain_of(args: argparse.Namespace) -> Any:
         ("--illuminant", "light for the colours, daylight or equal energy", ILLUMINANTS, "D65"),
         ("--cosine", "map f·cosθo, the radiance of a lit surface, instead of f", bool),
         ("--exposure EV", "exposure of the PNG in stops; default: half of the diffracted light is "
-         "darker than white", options.STOPS),
+         "darker than white", STOPS),
         ("--spectral", "also write every band as a channel of the EXR", bool),
     )),
     surface_options(),
@@ -182,12 +182,11 @@ def run(args: argparse.Namespace) -> Figures:
     if args.spectral and not exr:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
 
-    spectrum = options.wavelengths(args)
-    bands = Bands.choose(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
+    bands = Bands.choose(args.wavelength_range, args.step, args.wavelength)
     evaluate = _by_bsdf if args.method is None else _by_method
     light = LightDirection(args.theta, args.phi)
     check_map(bands, args.resolution, args.samples, args.spectral)
-    result, surface, method = evaluate(args, light, bands, spectrum)
+    result, surface, method = evaluate(args, light, bands)
     exposure = None if bands.is_single else args.exposure
     if exr:
         notes = {"source": str(args.source), "surface": surface}
@@ -207,14 +206,12 @@ def run(args: argparse.Namespace) -> Figures:
             "seconds": seconds}  # fmt: skip
 
 
-def _by_bsdf(
-    args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
-) -> tuple[Any, str, str]:
+def _by_bsdf(args: argparse.Namespace, light: Any, bands: Any) -> tuple[Any, str, str]:
     """Map the renderer's BSDF; also return its surface and the variant in words."""
     variant = set_variant(args.mode)
     check_variant(bands, args.illuminant, args.spectral)
     notes = _notes(args)
-    with mitsuba_warnings(), Bar(args) as bar:
+    with Bar(args) as bar:
         with warnings.catch_warnings():
             if notes:  # the plugin has them only when it builds the table
                 check_surface(surface_parameters(args))
@@ -224,7 +221,7 @@ def _by_bsdf(
         result = brdf_map(
             bsdf, light.theta, light.phi, resolution=args.resolution, samples=args.samples,
             illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
-            wavelength=args.wavelength, **spectrum,
+            wavelength=args.wavelength, wavelength_range=args.wavelength_range, step=args.step,
         )  # fmt: skip
     return result, _surface(bsdf), variant
 
@@ -240,20 +237,16 @@ def _notes(args: argparse.Namespace) -> str:
         return options.notes(args, patch, TableSettings(**settings))
 
 
-def _by_method(
-    args: argparse.Namespace, light: Any, bands: Any, spectrum: dict[str, Any]
-) -> tuple[Any, str, str]:
+def _by_method(args: argparse.Namespace, light: Any, bands: Any) -> tuple[Any, str, str]:
     """Map a method of the thesis; also return its surface and the method in words."""
     samples, single = args.samples or 1, args.wavelength
     gain = gain_of(args)
     patch, settings = options.load_patch(args)
+    settings |= {"wavelength_range": args.wavelength_range, "step": args.step}
     if single is not None:
-        spectrum = {"wavelength_range": (0.999 * single, 1.001 * single), "step": 0.001 * single}
+        settings |= {"wavelength_range": (0.999 * single, 1.001 * single), "step": 0.001 * single}
     with Bar(args) as bar, warnings.catch_warnings(action="ignore", category=DiffractionWarning):
-        method = make(
-            args.method, patch, period=args.period, progress=bar,
-            **settings, **spectrum,
-        )  # fmt: skip
+        method = make(args.method, patch, period=args.period, progress=bar, **settings)
         start = time.perf_counter()
         result = method_map(
             method, light, step=bands.width, wavelength=single, resolution=args.resolution,
@@ -301,15 +294,10 @@ def _surface(bsdf: Any) -> str:
     """Describe the reflecting surface in a line."""
     described: Surface = bsdf.describe()
     turn, scale = described.orientation.number, described.height_scale.number
-    turned = [f"turned by {turn:g}°"] if turn != 0.0 else []
-    if described.solved:
-        width = f"coherence width {described.coherence_width:g} µm"
-        return "; ".join([described.text, width, *turned])
-    return "; ".join(
-        [
-            described.summary,
-            f"{described.coherence}, coherence width {described.patch.width_text}",
-            *([f"heights × {scale:g}"] if scale != 1.0 else []),
-            *turned,
-        ]
-    )
+    parts = [described.text, f"coherence width {described.coherence_width:g} µm"]
+    if not described.solved:
+        width = described.patch.width_text
+        parts = [described.summary, f"{described.coherence}, coherence width {width}"]
+    parts += [f"heights × {scale:g}"] if scale != 1.0 else []
+    parts += [f"turned by {turn:g}°"] if turn != 0.0 else []
+    return "; ".join(parts)

@@ -93,26 +93,12 @@ def say_warning(text: str) -> None:
 
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
-    """Print every Python warning inside as one line, and each text only once."""
+    """Print each warning inside, Python's or Mitsuba's, as one line, and each text only once."""
     say = functools.cache(say_warning)
 
     def show(message: Warning | str, category: type[Warning], *_: object) -> None:
         ours = issubclass(category, DiffractionWarning)
         say(str(message) if ours else f"{category.__name__}: {message}")
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", DiffractionWarning)
-        warnings.showwarning = show  # type: ignore[assignment]  # restored by catch_warnings
-        yield
-
-
-@contextlib.contextmanager
-def mitsuba_warnings() -> Iterator[None]:
-    """Print Mitsuba's warnings inside like this program's, each once.
-
-    A variant must be set.
-    """
-    say = functools.cache(say_warning)
 
     class Lines(mi.Appender):
         def append(self, level: object, text: str) -> None:
@@ -130,7 +116,10 @@ def mitsuba_warnings() -> Iterator[None]:
     logger.add_appender(Lines())
     logger.set_log_level(mi.LogLevel.Warn)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", DiffractionWarning)
+            warnings.showwarning = show  # type: ignore[assignment]  # restored by catch_warnings
+            yield
     finally:
         logger.clear_appenders()
         for appender in before:

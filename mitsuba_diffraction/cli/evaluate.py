@@ -31,9 +31,9 @@ from ..thesis.methods.method import trapezoid_rule
 from ..thesis.methods.periods import check_period
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
-from .console import Bar, mitsuba_warnings, say_warning
-from .options import whole_number
+from .console import Bar, say_warning
 from .report import Figures, beside, elapsed, output_of
+from .values import limits, path_ending_in, whole_number
 
 if TYPE_CHECKING:
     from ..thesis.period_fit import Beam, Fit, Response, Ridge
@@ -66,13 +66,13 @@ class _Experiment(NamedTuple):
     "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
     options.SOURCE,
     ("-o --output OUT", "picture; default: SOURCE's name with -evaluation.png in the current "
-     "folder", options.path_ending_in(".png")),
+     "folder", path_ending_in(".png")),
     options.Group("the beam", (
         *options.direction(theta=75.0, phi=None),
         *options.SPECTRUM,
         ("--angles FIRST:LAST", "viewing angles, degrees, positive away from the light; default: "
          "the order of the patch's own period, to the mirror direction",
-         options.limits),
+         limits),
         ("--angle-step DEG", "", float, 0.1),
         ("--order M", "order that is followed", int, 1),
     )),
@@ -94,39 +94,50 @@ def run(args: argparse.Namespace) -> Figures:
     files = beside(".csv", ".npz")
     written = files(output_of(args, Path(f"{args.source.stem}-evaluation.png"), files))
     experiment = _prepared(args)
-    response, ridge, fit, lines, figures = _measured(args, experiment)
+    patch, _, settings, gratings, held, beam, steps, angles = experiment
+    from ..thesis.period_fit import measure
     from ..thesis.period_fit.plot import figure, save_csv, save_npz
 
-    report = [("spectrum", str(grating)) for grating in experiment.gratings] + lines
-    period = figures["fitted_period"] if args.period is None else args.period
+    # `options.notes` has them
+    quiet = warnings.catch_warnings(action="ignore", category=DiffractionWarning)
+    with Bar(args) as bar, quiet:
+        brdf, sigma = _brdf(args, experiment, bar)
+        response = measure(
+            brdf, beam, steps, angles, sigma=sigma, label=args.method, progress=bar,
+        )  # fmt: skip
+        ridge, fit, line = _followed(response, args.order, held)
+        lines, more = _windows(args, experiment, fit, bar)
+    width = settings.get("coherence_width", "auto")
+    found = (math.nan, math.nan, math.nan) if fit is None else (fit.period, fit.error, fit.residual)
+    figures = {
+        **more, **dict(zip(("fitted_period", "fit_error", "residual"), found, strict=True)),
+        "coherence_width": resolved_width(width, [patch]), "source": str(args.source),
+    }  # fmt: skip
+    report = [*(("spectrum", str(grating)) for grating in gratings), ("fitted", line), *lines]
+    period = found[0] if args.period is None else args.period
     picture = figure(
         response, ridge if fit else None, None if math.isnan(period) else period,
-        order=args.order, title=experiment.patch.name,
+        order=args.order, title=patch.name,
         notes="\n".join(f"{name}: {text}" for name, text in report),
     )  # fmt: skip
     save_figure(written[0], picture)
     save_csv(written[1], ridge, period)
     save_npz(written[2], ridge, period, figures)
     print(
-        f"{', '.join(map(str, written))}: {experiment.patch.name}, method {args.method}, light at "
-        f"{experiment.beam}, {counted(experiment.steps.size, 'wavelength')}, "
-        f"{counted(experiment.angles.size, 'angle')}, "
+        f"{', '.join(map(str, written))}: {patch.name}, method {args.method}, light at {beam}, "
+        f"{counted(steps.size, 'wavelength')}, {counted(angles.size, 'angle')}, "
         f"{elapsed(args):.1f} s"
     )
     if distance := _distance(args, ridge):
-        report.insert(len(experiment.gratings) + 1, ("given", distance))
+        report.insert(len(gratings) + 1, ("given", distance))
     for name, text in report:
         print(f"  {name:<9} {text}")
-    asked = TableSettings(
-        coherence_width=experiment.settings.get("coherence_width", "auto"),
-        wavelength_range=experiment.settings["wavelength_range"],
-    )
-    if notes := options.notes(args, experiment.patch, asked):
+    asked = TableSettings(coherence_width=width, wavelength_range=settings["wavelength_range"])
+    if notes := options.notes(args, patch, asked):
         say_warning(notes)
-    beam = experiment.beam
-    print(f"  {'period':<9} {_published(fit, figures.get('window_error'))}")
-    return {"patch": experiment.patch.name, "method": args.method, "theta": beam.theta,
-            "phi": beam.phi, **figures}  # fmt: skip
+    print(f"  {'period':<9} {_published(fit, more.get('window_error'))}")
+    return {"patch": patch.name, "method": args.method, "theta": beam.theta, "phi": beam.phi,
+            **figures}  # fmt: skip
 
 
 def _prepared(args: argparse.Namespace) -> _Experiment:
@@ -141,8 +152,8 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
         check_period(args.period)
     if args.positions > MOST_WINDOWS:
         raise DiffractionError(f"positions={args.positions} must be from 0 to {MOST_WINDOWS}")
-    spectrum = options.wavelengths(args)
-    steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
+    spectrum = {"wavelength_range": args.wavelength_range, "step": args.step}
+    steps = trapezoid_rule(args.wavelength_range, args.step)[0]
     viewing_angles(args.angles, args.angle_step, args.theta, args.order)
     patch, settings = options.load_patch(args)
     ours = _by_table(args, settings)
@@ -162,35 +173,6 @@ def _prepared(args: argparse.Namespace) -> _Experiment:
     check_axes(steps, angles)
     within = in_medium(TableSource.of(patch), args.ext_ior)
     return _Experiment(patch, within, {**settings, **spectrum}, gratings, held, beam, steps, angles)
-
-
-def _measured(
-    args: argparse.Namespace, experiment: _Experiment
-) -> tuple[Response, Ridge, Fit | None, list[tuple[str, str]], dict[str, Any]]:
-    """Measure and fit the patch, and single windows.
-
-    Returns the response, its ridge of maxima, the fit of the period, lines to print, each with its
-    label, and entries of the NPZ file. The ridge is empty and the fit None if no period fits.
-    """
-    from ..thesis.period_fit import measure
-
-    patch, _, settings, _, held, beam, steps, angles = experiment
-    # `options.notes` has them
-    quiet = warnings.catch_warnings(action="ignore", category=DiffractionWarning)
-    with Bar(args) as bar, mitsuba_warnings(), quiet:
-        brdf, sigma = _brdf(args, experiment, bar)
-        response = measure(
-            brdf, beam, steps, angles, sigma=sigma, label=args.method, progress=bar,
-        )  # fmt: skip
-        ridge, fit, line = _followed(response, args.order, held)
-        lines, more = _windows(args, experiment, fit, bar)
-    figures = {**more,
-               "fitted_period": math.nan if fit is None else fit.period,
-               "fit_error": math.nan if fit is None else fit.error,
-               "residual": math.nan if fit is None else fit.residual,
-               "coherence_width": resolved_width(settings.get("coherence_width", "auto"), [patch]),
-               "source": str(args.source)}  # fmt: skip
-    return response, ridge, fit, [("fitted", line), *lines], figures
 
 
 def _by_table(args: argparse.Namespace, settings: dict[str, Any]) -> bool:

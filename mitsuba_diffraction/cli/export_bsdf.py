@@ -12,9 +12,9 @@ from ..errors import DiffractionError, counted
 from ..scene import set_variant
 from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
-from .console import Bar, mitsuba_warnings
-from .options import whole_number
+from .console import Bar
 from .report import Figures, elapsed, output_of
+from .values import numbers, path_ending_in, whole_number
 
 # Formats, and the suffixes of their files; the first format of a suffix is the default.
 _SUFFIXES = {
@@ -30,17 +30,17 @@ _SUFFIXES = {
     "become as wide as it, with all their light.",
     *SURFACE_SOURCE,
     ("-o --output OUT", "the file; default: SOURCE's name with .bsdf in the current folder",
-     options.path_ending_in(".bsdf", ".json", ".brdf", ".csv")),
+     path_ending_in(".bsdf", ".json", ".brdf", ".csv")),
     options.MODE,
     options.Group("the file", (
         ("--format", "default: rgl for .bsdf, bird for .json and .brdf, csv for .csv",
          tuple(_SUFFIXES)),
         ("--theta DEG", "angles of the light from the normal, e.g. 0:80:10; default: by format",
-         options.numbers),
+         numbers),
         ("--phi DEG", "azimuths of the light from x towards y; of zemax, the mirror direction's; "
-         "default: by format", options.numbers),
+         "default: by format", numbers),
         ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20; zemax has one, by default "
-         "550; default: by format", options.numbers, None, {"dest": "wavelengths"}),
+         "550; default: by format", numbers, None, {"dest": "wavelengths"}),
         ("--resolution N", "nodes of outgoing directions along an axis; default: 64 for rgl, 86 "
          "for zemax, 18 for bird and csv", whole_number(8)),
     )),
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> Figures:
     chosen = options.given(args, ("theta", "phi", "wavelengths"))
     arrays = {name: np.asarray(values, np.float64) for name, values in chosen.items()}
     grid = module.DEFAULT._replace(**arrays, **options.given(args, ["resolution"]))
-    with mitsuba_warnings(), Bar(args) as bar:
+    with Bar(args) as bar:
         bsdf = surface_bsdf(args)
         if "wavelengths" not in arrays:  # the format has its own, of which the table has some
             low, high = bsdf.describe().lit

@@ -14,9 +14,9 @@ from ..plugin.presets import presets
 from ..scene import set_variant
 from . import options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
-from .console import Bar, mitsuba_warnings, say_warning
-from .options import path_ending_in
+from .console import Bar, say_warning
 from .report import Figures, check_outputs, elapsed, output_of
+from .values import path_ending_in
 
 
 @options.command(
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> Figures:
         return _addon(args)
     options.refuse(args, ["folders"], ": is for --addon")
     take_source(args)
-    look = args.source.stem if args.preset is None else args.preset.partition(",")[0]
+    look = args.preset or args.source.stem
     name = args.name or "diffraction_" + re.sub(r"[^A-Za-z0-9_]", "_", look)
 
     def files_in(folder: Path) -> list[Path]:
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> Figures:
     check_name(name)  # before the folder and the tables are made
     folder = output_of(args, Path(f"{look}-osl"), files_in, make_folder=True)
     set_variant(args.mode)
-    with mitsuba_warnings(), Bar(args) as bar:
+    with Bar(args) as bar:
         bar(0, 0, "making tables")
         exported = export(surface_bsdf(args), folder, name)
     files = [exported.shader, exported.document, *exported.textures.values()]
@@ -99,7 +99,7 @@ def _exported_looks(args: argparse.Namespace, folder: Path) -> dict[str, Path]:
 
     set_variant(args.mode)
     folders = {}
-    with mitsuba_warnings(), Bar(args) as bar:
+    with Bar(args) as bar:
         for done, preset in enumerate(presets().values()):
             bar(done, len(presets()), preset.name)
             name = preset.name.replace("-", "_") + "_look"

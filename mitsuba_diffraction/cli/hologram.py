@@ -8,9 +8,8 @@ from shlex import quote
 
 from ..scene import set_variant
 from . import options
-from .console import mitsuba_warnings
-from .options import number_between, whole_number
 from .report import Figures, output_of
+from .values import number_between, whole_number
 
 
 @options.command(
@@ -46,17 +45,15 @@ def run(args: argparse.Namespace) -> Figures:
     parts = areas(args.picture, colours=args.colours, dots=args.dots, keep_ground=args.keep_ground)
     ny, nx = parts.labels.shape
     values = {}
-    with mitsuba_warnings():
-        if args.mesh is None:
-            place = label.card(nx / ny)
-        else:
-            set_variant("scalar_rgb")
-            place = label.front(
-                args.mesh, nx / ny, width=args.width, height=args.height, up=args.up,
-                turn=args.turn,
-            )  # fmt: skip
-            values = {"turn": f"{args.turn:g}", "up": args.up}
-        scene = label.write(folder, parts, place, args.mesh, **values)
+    if args.mesh is None:
+        place = label.card(nx / ny)
+    else:
+        set_variant("scalar_rgb")
+        place = label.front(
+            args.mesh, nx / ny, width=args.width, height=args.height, up=args.up, turn=args.turn
+        )
+        values = {"turn": f"{args.turn:g}", "up": args.up}
+    scene = label.write(folder, parts, place, args.mesh, **values)
     for line in label.described(parts):
         print(line)
     print(f"{scene}: render it, e.g. mitsuba-diffraction render {quote(str(scene))} --denoise")

@@ -18,9 +18,9 @@ from ..images import save_figure
 from ..settings import TableSettings
 from ..tables import DiffractionTable
 from . import options
-from .console import Bar, flagged, mitsuba_warnings
-from .options import path_ending_in
+from .console import Bar, flagged
 from .report import STDOUT, Figures, lines_of, plain
+from .values import path_ending_in
 
 # What `render MESH` and `tangents` do with a mesh without normals
 _SMOOTH = "none in the file; render MESH and tangents make smooth ones; sharp UV edges stay"
@@ -85,7 +85,8 @@ def run(args: argparse.Namespace) -> Figures:
 
         save_figure(args.picture, patches_figure(source.fields()), dpi=80)
         data["picture"] = str(args.picture)
-    data |= {name: list(map(flagged, data[name])) for name in ("warnings",) if name in data}
+    if "warnings" in data:
+        data["warnings"] = list(map(flagged, data["warnings"]))
     if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -111,8 +112,6 @@ def _formats(args: argparse.Namespace) -> Figures:
 
 def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
     file, kind = args.file, source.kind
-    if source.kind is FileKind.RECIPE:
-        return _recipe(source, args)
     if kind is FileKind.SCENE:
         raise DiffractionError(
             f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
@@ -131,17 +130,26 @@ def _describe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _heights(source: Source, args: argparse.Namespace) -> dict[str, Any]:
-    field = source.field()
-    settings = TableSettings(**options.table_options(args))
-    warnings = options.table_warnings([field], settings)
-    suggested = (jumping_lines(field),)
+    """Describe a file of heights, or a recipe."""
+    fields = source.fields()
+    settings = TableSettings(**{**source.settings, **options.table_options(args)})
+    patches = [{**field.summary(), **_periods(field)} for field in fields]
+    window = width_reason(resolved(settings, fields), fields)
+    warnings = options.table_warnings(fields, settings)
+    if source.kind is not FileKind.RECIPE:
+        warnings += filter(None, [jumping_lines(fields[0])])
+        return {"kind": "height field", **patches[0], "window": window, "warnings": warnings,
+                "limits": options.LIMITS}  # fmt: skip
     return {
-        "kind": "height field",
-        **field.summary(),
-        **_periods(field),
-        "window": width_reason(resolved(settings, [field]), [field]),
-        "warnings": [*warnings, *filter(None, suggested)],
-        "limits": options.LIMITS,
+        "kind": "recipe",
+        **({"generator": source.generator} if source.generator else {}),
+        "options": source.options.specified(),
+        "table": source.settings,
+        "output": str(source.output),
+        "output exists": source.output.is_file(),
+        "patches": patches,
+        "window": window,
+        "warnings": warnings,
     }
 
 
@@ -154,30 +162,13 @@ def _periods(field: HeightField) -> dict[str, Any]:
     return described
 
 
-def _recipe(source: Source, args: argparse.Namespace) -> dict[str, Any]:
-    fields = source.fields()
-    settings = TableSettings(**{**source.settings, **options.table_options(args)})
-    return {
-        "kind": "recipe",
-        **({"generator": source.generator} if source.generator else {}),
-        "options": source.options.specified(),
-        "table": source.settings,
-        "output": str(source.output),
-        "output exists": source.output.is_file(),
-        "patches": [{**field.summary(), **_periods(field)} for field in fields],
-        "window": width_reason(resolved(settings, fields), fields),
-        "warnings": options.table_warnings(fields, settings),
-    }
-
-
 def _mesh(file: Path) -> dict[str, Any]:
     from ..scene.fitted_mesh import fit_of
     from ..scene.orientation.mesh_files import load_mesh
     from ..scene.orientation.tangents import check_tangents
 
-    with mitsuba_warnings():
-        mesh = load_mesh(file)
-        report = check_tangents(mesh)
+    mesh = load_mesh(file)
+    report = check_tangents(mesh)
     materials = {}
     if file.suffix.lower() in GLTF:  # names that --preset and --assign take
         materials["materials"] = [each.name for each in materials_of(file)] or ["none"]

@@ -95,13 +95,9 @@ class Parser(argparse.ArgumentParser):
         self.exit(USAGE, f"{self.prog}: error: {line}; options: '{self.prog} --help'\n")
 
 
+@noted()
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
-    with noted():  # options may read files when they are parsed
-        return _main(argv)
-
-
-def _main(argv: Sequence[str] | None) -> int:
     try:
         words = list(sys.argv[1:] if argv is None else argv)
         for text in words:
@@ -120,7 +116,7 @@ def _main(argv: Sequence[str] | None) -> int:
         with ended_at_once():
             say_interrupted()
         return INTERRUPTED
-    with own_program(), warnings_in_one_line(), ended_at_once(), noted():
+    with own_program(), warnings_in_one_line(), ended_at_once():
         return _run(args)
 
 

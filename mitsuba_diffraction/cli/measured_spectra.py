@@ -15,7 +15,7 @@ from ..analysis.media import follow, in_medium, loaded_in_media, medium_index, o
 from ..analysis.scans import bsdf_of, table_of
 from ..analysis.spectra import Spectra, spectrum, table_range
 from ..analysis.spectrometer import MeasurementGeometry
-from ..analysis.treatments import Treatment, load_treatments, treatment_for
+from ..analysis.treatments import Treatment, load_treatments
 from ..errors import DiffractionError, counted
 from ..files import FileKind
 from ..heights import dominant_periods, stands_in_full
@@ -44,7 +44,7 @@ class Measurement:
     geometry: MeasurementGeometry
     lam: Any
     bar: Bar
-    _noted: int = 0
+    _notes: list[str] = field(default_factory=list)
     _say_once: Callable[[str], None] = field(default_factory=lambda: functools.cache(say))
 
     def of_file(self, file: Path) -> list[Spectra]:
@@ -54,8 +54,8 @@ class Measurement:
         """
         from ..orders.file import load_orders
 
-        found = treatment_for(file, load_treatments(self.args.treatments))
-        treatment = found.updated(Treatment(options.load_options(self.args)))
+        asked = Treatment(options.load_options(self.args))
+        treatment = load_treatments(self.args.treatments, asked)(file)
         source = TableSource.of(file, treatment.options)
         if source.kind is FileKind.ORDERS:
             return [self._of_table(load_orders(file), file)]
@@ -67,9 +67,12 @@ class Measurement:
         return [self._of_heights(source.read(), file, treatment)]
 
     def say_notes(self) -> None:
-        """Print the number of scans with notes, beside the notes of the first scan."""
-        if self._noted > 1:
-            others = counted(self._noted - 1, "more scan")
+        """Print the notes on the first scan that has any, and warnings; count the others."""
+        for n, line in enumerate(self._notes):
+            if n == 0 or stands_in_full(line):
+                say(line)
+        if len(self._notes) > 1:
+            others = counted(len(self._notes) - 1, "more scan")
             say(f"notes on {others}: 'mitsuba-diffraction info' prints them")
 
     def _of_table(self, table: Any, file: Path) -> Spectra:
@@ -84,26 +87,10 @@ class Measurement:
                 f"'{file}' is a table, without heights to find gratings in; give --azimuth in "
                 "degrees"
             )
-        low, high = (table.wavelength_range[0], math.inf) if heights else table.wavelengths
-        lam = self._within(low, high, file)
+        limits = (table.wavelength_range[0], math.inf) if heights else table.wavelengths
+        remedy = ", or make a table of a wider range"
+        lam = known(args, self.lam, limits, f"'{file}' has light", remedy, self._say_once)
         return self._spectrum(table, self.geometry, lam)
-
-    def _within(self, low: float, high: float, file: Path) -> Any:
-        """Return the wavelengths that a table has, nm.
-
-        Raises a DiffractionError if --wavelength-range names others, or it has none.
-        """
-        lam, first, last = self.lam, f"{self.lam[0]:g}", f"{self.lam[-1]:g}"
-        inside = lam[(lam >= low) & (lam <= high)]
-        known = f"from {low:g} nm on" if math.isinf(high) else f"from {low:g} to {high:g} nm"
-        if len(inside) < len(lam) and (self.args.wavelength_range is not None or not len(inside)):
-            raise DiffractionError(
-                f"'{file}' has light {known}, and the wavelengths are {first} to {last} nm; give "
-                "others by --wavelength-range, or make a table of a wider range"
-            )
-        if len(inside) < len(lam):
-            self._say_once(f"'{file}' has light {known}: other wavelengths are left out")
-        return inside
 
     def _of_heights(self, source: TableSource, file: Path, treatment: Treatment) -> Spectra:
         """Measure the spectra of heights; `auto` turns the lamp across their strongest grating."""
@@ -117,7 +104,7 @@ class Measurement:
         notes = within.warnings(settings)
         line = notes_line(notes, file, treatment.options, TableSettings(**asked))
         if line and args.crops is None:
-            self._say_first(line)
+            self._notes.append(line)
         if table.settings.window_width is not None:
             self._say_once(blur(table.window_width, medium_index(args.ext_ior, first)))
         if args.light_azimuth == "auto":
@@ -144,8 +131,27 @@ class Measurement:
         variables = angular_variables(bsdf, lam, azimuth, cone, before, self.bar)
         return replace(spectra, angular=(variables,))
 
-    def _say_first(self, line: str) -> None:
-        """Print the notes on the first scan that has any, and warnings; count the others."""
-        self._noted += 1
-        if self._noted == 1 or stands_in_full(line):
-            say(line)
+
+def known(
+    args: argparse.Namespace, lam: Any, limits: tuple[float, float], what: str, remedy: str = "",
+    say: Callable[[str], None] = say,
+) -> Any:  # fmt: skip
+    """Return the wavelengths (n,) within limits, nm; say that others are left out.
+
+    what : name of the surface or material with the limits, and a verb, for messages.
+    remedy : what else to do than to give other wavelengths.
+
+    Raises a DiffractionError if --wavelength-range names others, or none is left.
+    """
+    low, high = limits
+    inside = lam[(lam >= low) & (lam <= high)]
+    if len(inside) == len(lam):
+        return lam
+    span = f"{what} from {low:g} " + ("nm on" if math.isinf(high) else f"to {high:g} nm")
+    if args.wavelength_range is not None or not len(inside):
+        raise DiffractionError(
+            f"{span}, and the wavelengths are {lam[0]:g} to {lam[-1]:g} nm; give others by "
+            f"--wavelength-range{remedy}"
+        )
+    say(f"{span}: other wavelengths are left out")
+    return inside

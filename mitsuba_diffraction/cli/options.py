@@ -1,20 +1,17 @@
-"""Commands, declared by `command`; options that several share, and types of arguments.
+"""Commands, declared by `command`, and options that several share.
 
-A value that does not fit is a usage error that quotes it. Options are rows of values; the functions
-beside them read the given values.
+Options are rows of values; the functions beside them read the given values.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError, quoted
+from ..errors import DiffractionError
 from ..heights import HeightField, LoadOptions, Source, units_warning
 from ..heights.coherence import resolved
 from ..heights.read import BY_DEFAULT, OPTIONS
@@ -25,12 +22,10 @@ from ..settings import SETTINGS, TableSettings, checked
 from ..tables.build.checks import check_units, check_window, period_of, warnings_of
 from ..thesis.methods import NAMES
 from .report import Figures
+from .values import NUMBERS, limits, path_ending_in, whole_number
 
 #: The values that `add_option` takes after the group.
 Row = tuple[Any, ...]
-
-#: Numbers of an option that accepts ranges, at most.
-_MOST_NUMBERS = 10_000
 
 #: Limits of spectra from heights, for help and descriptions.
 LIMITS = (
@@ -84,82 +79,6 @@ VIEW = (
 
 def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
-
-
-def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
-    """Return a type of argument: a path with one of the suffixes."""
-
-    def path(text: str) -> Path:
-        result = Path(text)
-        if result.suffix.lower() not in suffixes:
-            expected = " or ".join(suffixes)
-            raise argparse.ArgumentTypeError(
-                f"expected a name ending in {expected}, got {quoted(text)}"
-            )
-        return result
-
-    return path
-
-
-def whole_number(least: int, most: int = 2**31 - 1) -> Callable[[str], int]:
-    """Return a type of argument: a whole number of at least `least` that fits 31 bits."""
-    end = f" to {most}" if most < 2**31 - 1 else ""
-    return _number(int, least, most, f"a whole number from {least}{end}")
-
-
-def number_between(low: float, high: float) -> Callable[[str], float]:
-    """Return a type of argument: a number from `low` to `high`, and not NaN."""
-    return _number(float, low, high, f"a number from {low:g} to {high:g}")
-
-
-def _number(
-    kind: Callable[[str], Any], low: float | None, high: float, expected: str
-) -> Callable[[str], Any]:
-    """Return a type of argument: a number from `low` to `high`; any, and NaN, if `low` is None."""
-
-    def number(text: str) -> Any:
-        with contextlib.suppress(ValueError):
-            value = kind(text)
-            if low is None or low <= value <= high:
-                return value
-        raise argparse.ArgumentTypeError(f"expected {expected}, got {quoted(text)}")
-
-    return number
-
-
-# Kinds of numbers whose limits the commands check, in words.
-_NUMBERS: dict[Any, str] = {float: "one number", int: "one whole number"}
-#: Type of an exposure.
-STOPS = number_between(-100, 100)
-
-
-def numbers(text: str) -> tuple[float, ...]:
-    """Type of argument: values and FIRST:LAST:STEP, joined by commas."""
-    try:
-        return tuple(n for part in text.split(",") for n in _range_of(part))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            "expected numbers such as 30, 0,30,60 or -85:85:5 (FIRST:LAST:STEP, rising, at most "
-            f"{_MOST_NUMBERS} of them), got {quoted(text)}"
-        ) from error
-
-
-def limits(text: str) -> tuple[float, float]:
-    """Type of argument: FIRST:LAST, two numbers; see `settings` for what they may be."""
-    with contextlib.suppress(ValueError):
-        first, last = (float(part) for part in text.split(":"))
-        return first, last
-    raise argparse.ArgumentTypeError(f"expected FIRST:LAST, such as 400:700, got {quoted(text)}")
-
-
-def _range_of(text: str) -> list[float]:
-    """Return a number, or numbers from FIRST to LAST by STEP; else raise a ValueError."""
-    if ":" not in text:
-        return [float(text)]
-    first, last, step = (float(part) for part in text.split(":"))
-    if not (step > 0.0 and last >= first and (last - first) / step < _MOST_NUMBERS):
-        raise ValueError(text)
-    return [first + n * step for n in range(int((last - first) / step + 1e-9) + 1)]
 
 
 @dataclass(frozen=True)
@@ -232,10 +151,8 @@ def add_option(
         how["action"] = "store_true"
     elif isinstance(kind, list):
         how |= {"action": "append", "type": kind[0], "default": []}
-    elif kind in _NUMBERS:
-        how["type"] = _number(kind, None, math.inf, _NUMBERS[kind])
     elif kind is not None:  # BooleanOptionalAction takes no type, not even None
-        how["choices" if isinstance(kind, tuple) else "type"] = kind
+        how["choices" if isinstance(kind, tuple) else "type"] = NUMBERS.get(kind, kind)
     if default is not None:
         how["default"] = default
     if default is not None and "default:" not in text:
@@ -346,17 +263,11 @@ def direction(theta: float = 0.0, phi: float | None = 0.0) -> tuple[Row, Row]:
     )
 
 
-#: Limits of the spectrum and its step, nm; see `wavelengths`.
+#: Limits of the spectrum and its step, nm.
 SPECTRUM = (
-    *table(("wavelength_range",)),
+    *((*row, TableSettings.wavelength_range) for row in table(("wavelength_range",))),
     ("--step NM", "between wavelengths", float, 5.0),
 )
-
-
-def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments `wavelength_range` and `step`, nm."""
-    span = tuple(args.wavelength_range or TableSettings.wavelength_range)
-    return {"wavelength_range": span, "step": args.step}
 
 
 def method(default: str | None, text: str) -> tuple[Row, Row]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import counted
 from . import options
-from .options import number_between
 from .report import Figures, output_of
+from .values import number_between, numbers, path_ending_in
 
 
 @options.command(
@@ -21,14 +21,14 @@ from .report import Figures, output_of
     "'solve --import' reads the file back.",
     ("TABLE", "of orders (.nc), from 'mitsuba-diffraction solve'", Path),
     ("-o --output OUT", "the CSV, or NetCDF (.nc); default: TABLE's name with .csv in the "
-     "current folder", options.path_ending_in(".csv", ".nc")),
+     "current folder", path_ending_in(".csv", ".nc")),
     options.Group("the light", (
         ("--theta DEG", "angles of the light from the normal, -90 to 90; e.g. 30, or "
-         "--theta=-85:85:5; default: 0", options.numbers, (0.0,)),
+         "--theta=-85:85:5; default: 0", numbers, (0.0,)),
         ("--phi DEG", "azimuths of the light, from x, across the grooves, towards y; default: 0",
-         options.numbers, (0.0,)),
+         numbers, (0.0,)),
         options.Group("", (
-            ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20", options.numbers),
+            ("--wavelength NM", "wavelengths in vacuum, e.g. 400:700:20", numbers),
             ("--step NM", "between wavelengths, over all of the table",
              number_between(0.01, 1000), 5.0),
         )),

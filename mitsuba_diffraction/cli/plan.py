@@ -23,9 +23,9 @@ from ..scene.planning.plan import (
 )
 from ..scene.planning.report import describe
 from . import options, scene_options
-from .console import Bar, mitsuba_warnings, say, say_warning
-from .options import number_between, whole_number
+from .console import Bar, say, say_warning
 from .report import Figures, check_outputs, lines_of
+from .values import number_between, path_ending_in, whole_number
 
 #: How a plan is made.
 PLAN = (
@@ -67,7 +67,7 @@ def planning_variant(requested: str | None) -> str:
     *scene_options.SCENE,
     *PLAN,
     ("-o --output OUT.toml", "write the recipe; those of further tables are OUT_2.toml and so "
-     "on", options.path_ending_in(".toml")),
+     "on", path_ending_in(".toml")),
     options.json(),
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> Figures:
         check_outputs([args.output])
 
     variant = planning_variant(args.mode)
-    with mitsuba_warnings(), Bar(args, delay=0) as bar:
+    with Bar(args, delay=0) as bar:
         planned = _planned(args, partial(load_scene, args.scene, parameters), bar)
     report = {
         "scene": str(args.scene),

@@ -13,8 +13,6 @@ from ..cluster.jobs import WorkerCalls
 from ..errors import counted, warn
 from ..files import FileKind, kind_of
 from ..heights import HeightField
-from ..progress import Progress
-from ..settings import TableSettings
 from ..system import peak_memory
 from ..tables import DiffractionTable, TableSource
 from ..tables.build.build import build_with
@@ -22,7 +20,8 @@ from ..tables.build.checks import warnings_of
 from . import options
 from .console import Bar
 from .report import Figures, check_outputs, output_of
-from .workers import WORKERS, client_of, on_workers
+from .values import path_ending_in
+from .workers import WORKERS, client_of
 
 
 @options.command(
@@ -33,7 +32,7 @@ from .workers import WORKERS, client_of, on_workers
      "surface make one table of their mean powers, several recipes make a table each", Path,
      None, {"dest": "sources"}),
     ("-o --output OUT", "the table; default: where the recipe says, or else SOURCE's name with "
-     ".exr in the current folder", options.path_ending_in(".exr")),
+     ".exr in the current folder", path_ending_in(".exr")),
     options.heights(),
     options.Group("the table", (
         *options.table(), *options.table(("wavelength_range",)),
@@ -73,8 +72,9 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
         fields = source.fields()
     for line in warnings_of(fields, settings):  # before the minutes that the table takes
         warn(line)
-    with Bar(args) as bar:
-        table, workers = _built(args, fields, settings, bar)
+    with client_of(args) as client, Bar(args) as bar:
+        calls = None if client is None else WorkerCalls(client)
+        table = build_with(fields, settings, bar, calls or map)
         if is_new:
             make_folder(output.parent)
         table.save(output)
@@ -82,24 +82,15 @@ def _precompute(args: argparse.Namespace, source: TableSource) -> dict[str, Any]
     print(f"{', '.join(map(str, given))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
-    if workers:
+    figures = {"file": str(output), **table.summary()}
+    if calls is not None:
+        work = calls.report
         print(
-            f"  work   {counted(workers['tasks'], 'task')} of windows, {workers['retries']} "
-            f"given out again, {workers['busy']:.1f} s of workers' work"
+            f"  work   {counted(work.tasks, 'task')} of windows, {work.retries} given out again, "
+            f"{work.busy:.1f} s of workers' work"
         )
-    return {"file": str(output), **table.summary(), **({"workers": workers} if workers else {})}
-
-
-def _built(
-    args: argparse.Namespace, fields: Sequence[HeightField], settings: TableSettings, bar: Progress
-) -> tuple[DiffractionTable, dict[str, Any]]:
-    """Build the table; also return what workers did for it, where they build windows."""
-    if not on_workers(args):
-        return build_with(fields, settings, bar), {}
-    with client_of(args) as client:
-        calls = WorkerCalls(client)
-        table, work = build_with(fields, settings, bar, calls), calls.report
-        return table, {"tasks": work.tasks, "retries": work.retries, "busy": work.busy}
+        figures["workers"] = {"tasks": work.tasks, "retries": work.retries, "busy": work.busy}
+    return figures
 
 
 def _report(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 import tempfile
@@ -19,9 +20,9 @@ from ..scene.load import sensor_of
 from ..thesis import shaders  # noqa: F401 - registers its methods
 from . import options, scene_options
 from .brdf_map import SURFACE_SOURCE, surface_bsdf, surface_options, take_source
-from .console import Bar, mitsuba_warnings, say, say_warning
-from .options import path_ending_in, whole_number
+from .console import Bar, say, say_warning
 from .report import Figures, check_outputs, elapsed, output_of, plain, save_json
+from .values import STOPS, path_ending_in, whole_number
 
 _EXPORTED = ("fast", "exact")
 
@@ -32,7 +33,7 @@ _EXPORTED = ("fast", "exact")
     "zoom, drag the light, change method, exposure and material.",
     *scene_options.SCENE,
     ("--method", "method to start with", WEB_METHODS, "fast"),
-    ("--exposure EV", "stops to start with: +1 doubles the light", options.STOPS, 0.0),
+    ("--exposure EV", "stops to start with: +1 doubles the light", STOPS, 0.0),
     options.VIEW,
     ("-o --output OUT", "page to write; default: one in the system's folder of temporary files",
      path_ending_in(".html")),
@@ -40,16 +41,13 @@ _EXPORTED = ("fast", "exact")
 def view(args: argparse.Namespace) -> Figures:
     """Write the page, open it, and return its figures."""
     scene_options.put_on_stage(args)
-    if args.output is None:
-        folder = Path(tempfile.mkdtemp(prefix="mitsuba-diffraction-"))
-        args.output = folder / f"{args.name.stem}.html"
-        try:
-            figures = _write_page(args, WEB_METHODS)
-        except BaseException:
-            folder.rmdir()
-            raise
-    else:
+    with contextlib.ExitStack() as failed:
+        if args.output is None:
+            folder = Path(tempfile.mkdtemp(prefix="mitsuba-diffraction-"))
+            failed.callback(folder.rmdir)
+            args.output = folder / f"{args.name.stem}.html"
         figures = _write_page(args, WEB_METHODS)
+        failed.pop_all()
     start = {"method": args.method, "exposure": args.exposure}
     if args.method in figures["left_out"]:
         raise DiffractionError(f"method {args.method}: {figures['left_out'][args.method]}")
@@ -104,7 +102,7 @@ def compare(args: argparse.Namespace) -> Figures:
 
     variant = _set_variant(args)
     every = "all" in args.method
-    with mitsuba_warnings(), Bar(args, delay=0) as bar:
+    with Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         comparison = Comparison(
             _scene(args, parameters), str(args.scene), variant, folder, args.sensor, args.spp,
@@ -147,7 +145,7 @@ def _write_page(args: argparse.Namespace, methods: Sequence[str], title: str = "
     from ..realtime.web import export_viewer
 
     _set_variant(args)
-    with mitsuba_warnings(), Bar(args, delay=0) as bar:
+    with Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         page = export_viewer(
             _scene(args, parameters), args.output, title=title or args.name.stem,
@@ -198,7 +196,7 @@ def export_shader(args: argparse.Namespace) -> Figures:
     from ..realtime.glsl.export import export_shader
 
     _set_variant(args)
-    with mitsuba_warnings(), Bar(args) as bar:
+    with Bar(args) as bar:
         bar(0, 0, "making tables")
         shader = export_shader(surface_bsdf(args), folder, list(dict.fromkeys(args.method)))
     files = [folder / "diffraction.glsl", *(folder / f"{t.name}.exr" for t in shader.textures)]

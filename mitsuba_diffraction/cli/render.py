@@ -34,13 +34,14 @@ from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options, scene_options
 from .animation import ANIMATION, say_why
-from .console import Bar, mitsuba_warnings, say, say_warning
+from .console import Bar, say, say_warning
 from .interrupt import INTERRUPTED, keep_in_mind
 from .observed import OBSERVER, bands_of, eye_of, save_observed
 from .plan import PLAN, check_plan_options, load_by_plan, recipe_file
 from .report import Figures, check_outputs, elapsed, exr_and_png, output_of
 from .studio import STUDIO_OPTIONS, take_studio
-from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_report
+from .values import STOPS
+from .workers import THREADS, WORKERS, film_of, on_workers, say_report
 
 
 @options.command(
@@ -53,7 +54,7 @@ from .workers import THREADS, WORKERS, client_of, film_of, on_workers, say_repor
     ("-o --output OUT", "EXR with a PNG beside it, or a PNG; with --frames a folder or .webp, "
      ".gif, .mp4; default: SCENE.exr or SCENE_frames", Path),
     *options.samples(1, None),
-    ("--exposure EV", "of the PNG, in stops: +1 doubles the light", options.STOPS, 0.0),
+    ("--exposure EV", "of the PNG, in stops: +1 doubles the light", STOPS, 0.0),
     options.VIEW,
     ("--denoise", "also write a denoised picture, NAME_denoised (extra denoise); with "
      "--frames, denoise each frame", bool),
@@ -118,8 +119,7 @@ def _on_workers(args: argparse.Namespace) -> Figures:
     variant = set_variant(args.mode)
     keep = output.with_name(f"{output.name}.passes")
     keep_in_mind(f"finished passes are kept in '{keep}': run the command again to go on")
-    with mitsuba_warnings(), client_of(args) as client:
-        film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
+    with film_of(args, [FrameRequest(parameters, args.spp, args.seed)], variant, keep) as film:
         _check_colours(args, output, film.scene, film.sensor)
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             reports = [_finish(args, result, output, variant, film.scene)
@@ -137,29 +137,26 @@ def _run_one(args: argparse.Namespace, eye: Eye | None) -> Figures:
     whole = partial(
         load_scene, args.scene, parameters, box_filter=args.denoise, bands=bands, say=say
     )
-    with mitsuba_warnings():
-        with Bar(args, unit=" spp", delay=0) as bar:
-            bar(0, 0, "loading")
-            scene = whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
-            sensor = sensor_of(scene, args.sensor, args.preview)
-            spp = args.spp or preview_samples(sensor, args.preview)
-            check_outputs(_files(args, output))  # of what only loading tells
-            _check_colours(args, output, scene, sensor)
-            with Stop() as stop:
-                result = render_passes(
-                    scene, sensor, spp=spp, seed=args.seed, stop=stop, progress=bar
-                )
-        if result.spp == 0:
-            raise KeyboardInterrupt  # interrupted before the first pass, without a picture
-        if result.interrupted:
-            say(f"interrupted; the picture has {result.spp} of {counted(spp, 'sample')} per pixel")
-            args.code = INTERRUPTED
-        report = _finish(args, result, output, variant, scene, eye)
-        if args.denoise:
-            clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
-            files = _written(args, clean, _denoised(output), {"denoised": "Open Image Denoise"})
-            print(f"{' and '.join(map(str, files))}: denoised")
-            report["files"] += files
+    with Bar(args, unit=" spp", delay=0) as bar:
+        bar(0, 0, "loading")
+        scene = whole() if args.plan is None else load_by_plan(args, variant, whole, bar)
+        sensor = sensor_of(scene, args.sensor, args.preview)
+        spp = args.spp or preview_samples(sensor, args.preview)
+        check_outputs(_files(args, output))  # of what only loading tells
+        _check_colours(args, output, scene, sensor)
+        with Stop() as stop:
+            result = render_passes(scene, sensor, spp=spp, seed=args.seed, stop=stop, progress=bar)
+    if result.spp == 0:
+        raise KeyboardInterrupt  # interrupted before the first pass, without a picture
+    if result.interrupted:
+        say(f"interrupted; the picture has {result.spp} of {counted(spp, 'sample')} per pixel")
+        args.code = INTERRUPTED
+    report = _finish(args, result, output, variant, scene, eye)
+    if args.denoise:
+        clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
+        files = _written(args, clean, _denoised(output), {"denoised": "Open Image Denoise"})
+        print(f"{' and '.join(map(str, files))}: denoised")
+        report["files"] += files
     return report
 
 
@@ -224,7 +221,7 @@ def _run_frames(args: argparse.Namespace) -> Figures:
     folder, film = _folder_and_film(args)
     if film is None:
         options.refuse(args, ["fps"], ": is for a film; name one, e.g. -o NAME.mp4")
-    if film is not None:
+    else:
         check_film(film)
         check_outputs([film])
     frames = _frames(args, folder)
@@ -235,20 +232,17 @@ def _run_frames(args: argparse.Namespace) -> Figures:
     done, workers = 0, None
     if to_do:
         variant = set_variant(args.mode)
-        with mitsuba_warnings():
-            with Bar(args, delay=0) as bar:
-                bar(0, 0, "checking the frames")
-                check_frames(args.scene, to_do)
-            keep_in_mind(f"finished frames are in '{folder}': run the command again to continue")
-            if on_workers(args):
-                done, workers = _frames_on_workers(args, to_do, folder, variant)
-            else:
-                with Bar(args, unit=" spp", delay=0) as bar:
-                    bar(0, 0, "loading")
-                    here = render_frames(
-                        args.scene, to_do, with_exr=args.exr, progress=bar, say=say
-                    )
-                    done = sum(1 for _ in here)
+        with Bar(args, delay=0) as bar:
+            bar(0, 0, "checking the frames")
+            check_frames(args.scene, to_do)
+        keep_in_mind(f"finished frames are in '{folder}': run the command again to continue")
+        if on_workers(args):
+            done, workers = _frames_on_workers(args, to_do, folder, variant)
+        else:
+            with Bar(args, unit=" spp", delay=0) as bar:
+                bar(0, 0, "loading")
+                here = render_frames(args.scene, to_do, with_exr=args.exr, progress=bar, say=say)
+                done = sum(1 for _ in here)
     report = {"scene": args.scene, "frames": len(frames), "new": done,
               "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
               "interrupted": done < len(to_do), "seconds": elapsed(args),
@@ -276,8 +270,7 @@ def _frames_on_workers(
     """Render frames on workers; return how many were finished, and what the workers did."""
     done = 0
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
-    with client_of(args) as client:
-        film = film_of(args, client, wanted, variant, folder / "passes")
+    with film_of(args, wanted, variant, folder / "passes") as film:
         with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for result, frame in zip(film.render(stop, bar), to_do, strict=False):
                 write_frame(frame, result.bitmap, args.scene, args.exr)

@@ -33,24 +33,25 @@ _OF_FILES = frozenset({".csv", ".exr", ".glsl", ".html", ".json", ".md", ".npz",
 _INDENT = "  "
 
 
-def lines_of(data: Mapping[str, Any], depth: int = 0) -> Iterator[str]:
+def lines_of(data: Mapping[str, Any]) -> Iterator[str]:
     """Yield a line for each value: keys in words, aligned; nested mappings are indented."""
     # of arrays (ny, nx), which people are told as pixels along x and y, as extents
     turned = ((k, v[::-1] if k == _SHAPE and isinstance(v, list) else v) for k, v in data.items())
     rows = [(*_label(key), value) for key, value in turned]
     width = max((len(label) for label, _, value in rows if not _nested(value)), default=0)
-    margin = _INDENT * depth
     for label, unit, value in rows:
-        if isinstance(value, Mapping) and value:
-            yield f"{margin}{label}:"
-            yield from lines_of(value, depth + 1)
-        elif _nested(value):
-            yield f"{margin}{label}:"
-            for item in value:
-                yield from _item_lines(item, depth + 1)
-        else:
+        if not _nested(value):
             joint = " to " if label.endswith("range") else " x "
-            yield f"{margin}{label + ':':<{width + 1}} {_text(value, joint)} {unit}".rstrip()
+            yield f"{label + ':':<{width + 1}} {_text(value, joint)} {unit}".rstrip()
+            continue
+        yield f"{label}:"
+        if isinstance(value, Mapping):
+            yield from (f"{_INDENT}{line}" for line in lines_of(value))
+            continue
+        for item in value:
+            lines = lines_of(item) if isinstance(item, Mapping) else [_text(item)]
+            for n, line in enumerate(lines):
+                yield f"{_INDENT}{'  ' if n else '- '}{line}"
 
 
 def plain(value: Any) -> Any:
@@ -99,17 +100,6 @@ def _nested(value: Any) -> bool:
     if isinstance(value, (list, tuple)):
         return any(isinstance(item, (str, Mapping, list, tuple)) for item in value)
     return isinstance(value, Mapping) and bool(value)
-
-
-def _item_lines(item: Any, depth: int) -> Iterator[str]:
-    margin = _INDENT * depth
-    if not isinstance(item, Mapping):
-        yield f"{margin}- {_text(item)}"
-        return
-    mark = "- "
-    for line in lines_of(item, depth):
-        yield margin + mark + line.removeprefix(margin)
-        mark = "  "
 
 
 def _text(value: Any, joint: str = " x ") -> str:

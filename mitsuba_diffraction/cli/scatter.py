@@ -19,6 +19,7 @@ from ..tables.powers import scattered_share
 from . import options
 from .console import Bar, say_warning
 from .report import Figures, beside, output_of
+from .values import numbers, path_ending_in
 
 #: He-Ne laser, nm.
 _WAVELENGTH = 632.8
@@ -32,8 +33,8 @@ _WAVELENGTH = 632.8
     "scan, the best surface of second degree is form and subtracted, unless --level names another.",
     options.SOURCE,
     ("-o --output OUT", "the CSV; the picture (.png) lies beside it; default: SOURCE's name "
-     "with -scatter.csv in the current folder", options.path_ending_in(".csv")),
-    ("--wavelength NM", "wavelengths in vacuum", options.numbers, f"{_WAVELENGTH:g}",
+     "with -scatter.csv in the current folder", path_ending_in(".csv")),
+    ("--wavelength NM", "wavelengths in vacuum", numbers, f"{_WAVELENGTH:g}",
      {"dest": "wavelengths"}),
     *options.table(("coherence_width", "tolerance")),
     options.json(),

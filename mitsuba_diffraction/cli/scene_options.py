@@ -9,31 +9,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..errors import DiffractionError, quoted
+from ..errors import DiffractionError
 from ..files import MESHES, OTHER_MESHES, FileKind, kind_of, readable_file
 from ..plugin.parameters import NAMES, REFLECTING
-from ..scene.parameters import MATERIAL, Change, change_of
+from ..scene.parameters import MATERIAL
 from ..scene.stage import STUDIO
-from .options import MODE, whole_number
+from .options import MODE
+from .values import pair, whole_number
 
 #: Id of the BSDF of a scene's patch: of the studio, the material ball, plate, sphere and scales.
 SURFACE = "surface"
-
-
-def definition(text: str) -> tuple[str, str]:
-    """Parse KEY=VALUE."""
-    key, equals, value = text.partition("=")
-    if not (equals and key):
-        raise argparse.ArgumentTypeError(f"expected KEY=VALUE, got {quoted(text)}")
-    return key, value
-
-
-def change(text: str) -> Change:
-    """Parse KEY=FROM:TO, a parameter of a scene that changes."""
-    try:
-        return change_of(text)
-    except DiffractionError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 #: A scene, its parameters, variant and sensor.
@@ -47,10 +32,10 @@ SCENE = (
      "default of ID: surface", [str], None, {"dest": "presets"}),
     ("--assign ID=FILE[,NAME=VALUE...]", "surface on the BSDF or shape of this id, or the material "
      "of a glTF mesh, e.g. mat-Skin=scale.exr,int_ior=1.56; may be given several times",
-     [definition], None, {"dest": "materials"}),
+     [pair("KEY=VALUE", empty=True)], None, {"dest": "materials"}),
     MODE,
     ("-D --define KEY=VALUE", "set a parameter of the scene; may be given several times",
-     [definition], None, {"dest": "parameters"}),
+     [pair("KEY=VALUE", empty=True)], None, {"dest": "parameters"}),
     ("--sensor N", "number of the sensor, from 0", whole_number(0), 0),
 )  # fmt: skip
 

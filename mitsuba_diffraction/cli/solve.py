@@ -15,8 +15,8 @@ from ..heights import HeightField, LoadOptions
 from ..heights.read import read_heights
 from . import options
 from .console import Bar, say
-from .options import number_between, whole_number
 from .report import Figures, check_outputs, output_of
+from .values import limits, number_between, numbers, path_ending_in, value, whole_number
 from .workers import WORKERS, calls_for
 
 if TYPE_CHECKING:
@@ -39,18 +39,12 @@ def _layer(text: str) -> Layers:
     if text.endswith(".toml"):
         from ..orders.solve.films import read_layers
 
-        try:
-            return read_layers(text)
-        except DiffractionError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
+        return read_layers(text)
     material, colon, thickness = text.rpartition(":")
-    try:
-        return ((material, float(thickness if colon else "")),)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(
-            "expected MATERIAL:THICKNESS in µm, such as 1.46:0.1, or a file (.toml), got "
-            f"'{text[:40]}'"
-        ) from error
+    return ((material, float(thickness if colon else "")),)
+
+
+_LAYERS = value("MATERIAL:THICKNESS in µm, such as 1.46:0.1, or a file (.toml)", _layer)
 
 
 @options.command(
@@ -62,7 +56,7 @@ def _layer(text: str) -> Layers:
     ("SOURCE", "lamellar, blazed or sinusoidal; a line of one period (CSV of x, z in µm, "
      "undercut allowed); a recipe (.toml); with --import a file of efficiencies"),
     ("-o --output OUT", "the table; default: SOURCE's name with .nc",
-     options.path_ending_in(".nc")),
+     path_ending_in(".nc")),
     options.Group("the grating", (
         ("--period D", "µm", number_between(0.01, 1000)),
         ("--crossed", "SOURCE is one period of heights in x and y: an array (.npy) in µm, or an "
@@ -79,9 +73,9 @@ def _layer(text: str) -> Layers:
         ("--superstrate N", "index of the clear medium above the grooves, e.g. 1.58 under "
          "polycarbonate; default: 1", number_between(1, 5)),
         ("--layer M:T", "film on the grooves, material and thickness along z in µm, e.g. 1.46:0.1; "
-         "once for each, from the material upwards", [_layer], None, {"dest": "layers"}),
+         "once for each, from the material upwards", [_LAYERS], None, {"dest": "layers"}),
         ("--beneath M:T", "layer beneath the grooves, or a file of layers and slices (.toml); once "
-         "for each, from the substrate upwards", [_layer]),
+         "for each, from the substrate upwards", [_LAYERS]),
         ("--substrate M", "material below them; default: --material"),
         ("--thin", "a thin sheet that light goes through, with these grooves on its upper side; "
          "needs an index as material", bool),
@@ -89,7 +83,7 @@ def _layer(text: str) -> Layers:
          "from within; needs an index as material; solved by coupled waves", bool),
     )),
     options.Group("the table", (
-        ("--wavelength-range FIRST:LAST", "nm; default: 380:780", options.limits, None,
+        ("--wavelength-range FIRST:LAST", "nm; default: 380:780", limits, None,
          {"dest": "wavelengths"}),
         ("--tolerance E", "mean error between nodes, of the light in all orders but 0; 95 %% of "
          "directions keep 4 times as much; default: 0.01", number_between(1e-4, 0.2)),
@@ -102,9 +96,9 @@ def _layer(text: str) -> Layers:
          bool),
         ("--theta DEG", "solve light from these directions alone, angles from the normal within "
          "the superstrate, e.g. 63.4, or --theta=-20:20:5: for an echelle in its mount",
-         options.numbers),
+         numbers),
         ("--phi DEG", "with --theta: azimuths from x, across the grooves, towards y; default: 0",
-         options.numbers),
+         numbers),
         ("--step NM", "with --theta or --crossed: between wavelengths; default: 5, of all "
          "directions of crossed gratings 20", number_between(0.01, 1000)),
         ("--import", "SOURCE holds efficiencies of another program or a bench: a long CSV of "

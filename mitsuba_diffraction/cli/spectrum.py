@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.known_wavelengths import check_material, known_range
+from ..analysis.known_wavelengths import known_range
 from ..analysis.observers import eye_of, illuminant_of, quantum_catches
 from ..analysis.scans import check_surface
-from ..analysis.spectra import Spectra, mean_spectra
+from ..analysis.spectra import Spectra
 from ..analysis.spectrometer import MeasurementGeometry, column_name
 from ..errors import DiffractionError, counted
 from ..images import save_figure
@@ -22,10 +22,10 @@ from ..scene.load import set_variant
 from ..text_spectra import read_shares
 from . import options
 from .brdf_map import surface_options, surface_parameters
-from .console import Bar, mitsuba_warnings, say
-from .measured_spectra import Measurement
-from .options import number_between, whole_number
+from .console import Bar, say
+from .measured_spectra import Measurement, known
 from .report import Figures, elapsed, output_of
+from .values import limits, number_between, numbers, pair, path_ending_in, value, whole_number
 
 _RANGE = (300.0, 830.0)
 # Per cent of the standard below which a spectrum is said to be without light.
@@ -34,32 +34,20 @@ _NOTHING = 1e-3
 _SEEN = ("catches", "contrasts")
 
 
-def azimuth(text: str) -> float | str:
-    """Parse an angle, or auto."""
-    return text if text == "auto" else float(text)
-
-
-def _group(text: str) -> tuple[str, str]:
-    """Parse NAME=PATTERN."""
-    name, equals, pattern = text.partition("=")
-    if not (equals and name and pattern):
-        raise argparse.ArgumentTypeError(f"expected NAME=PATTERN, got {text!r}")
-    return name, pattern
-
-
 #: Options of the measurement.
 _SPECTROMETER = (
     ("--light DEG", "angle of the lamp from the normal", float, 30.0),
     ("--light-azimuth --azimuth DEG", "azimuth of the lamp from x towards y, degrees, or auto: "
-     "across the grooves of the strongest grating", azimuth, 0.0),
+     "across the grooves of the strongest grating",
+     value("an angle or auto", lambda text: text if text == "auto" else float(text)), 0.0),
     ("--detector DEG ...", "angles of the detectors from the normal, positive away from the lamp, "
-     "or ranges FIRST:LAST:STEP; default: the mirror direction", options.numbers),
+     "or ranges FIRST:LAST:STEP; default: the mirror direction", numbers),
     ("--acceptance DEG", "full angle of the cone that a detector collects", float, 2.0),
     ("--relative", "per cent of a white standard, of a perfect mirror, or of the incident light",
      ("white", "mirror", "none"), "white"),
     ("--polarisation", "also light polarised across (s) and in (p) the plane of incidence", bool),
     ("--wavelength-range FIRST:LAST", "nm; default: 300:830, or from where a table begins",
-     options.limits),
+     limits),
     ("--step NM", "between wavelengths", number_between(0.01, 1000), 5.0),
 )  # fmt: skip
 
@@ -74,7 +62,7 @@ _SPECTROMETER = (
     options.files("tables, also of orders, recipes or heights", "*"),
     ("--group NAME=PATTERN", "scans of one species instead of FILE, e.g. corn='corn/*.spm'; "
      "may be given several times",
-     [_group], None, {"dest": "groups"}),
+     [pair("NAME=PATTERN")], None, {"dest": "groups"}),
     ("--crops N", "cut each scan into N parts, whose standard errors are the scan's "
      "repeatability", whole_number(2)),
     ("--observer ANIMAL|CSV", "eye for quantum catches and contrasts (JND): avian_uv, "
@@ -82,9 +70,9 @@ _SPECTROMETER = (
     ("--illuminant LIGHT|CSV", "light of --observer: ideal (equal quanta), d55, d65, d75, "
      "leaves, or a file of wavelengths (nm) and photons; default: ideal"),
     ("--cone-ratios N,N,…", "relative numbers of the receptors of --observer, shortest waves "
-     "first, which share the noise; default: the eye's, docs/seen.md", options.numbers),
+     "first, which share the noise; default: the eye's, docs/seen.md", numbers),
     ("--weber E[,E,…]", "Weber fraction of the receptor of the longest waves, or of each; "
-     "default: 0.1", options.numbers),
+     "default: 0.1", numbers),
     ("--weber-luminance E", "Weber fraction of luminance; default: 0.1",
      number_between(1e-4, 1e2)),
     ("--iridescence", "also Bmax, t, gammaB, Hmax and gammaH of each scan (Gruson and others "
@@ -92,7 +80,7 @@ _SPECTROMETER = (
     ("--measured FILE[:COLUMN]", "measured reflectance to draw beside the curve of one detector, "
      "with the RMS difference: text of wavelengths (nm) and fractions or per cent of white"),
     ("-o --output OUT", "CSV, with a PNG beside it; default: FILE's name with -spectrum.csv in "
-     "the current folder", options.path_ending_in(".csv")),
+     "the current folder", path_ending_in(".csv")),
     options.Group("the spectrometer", _SPECTROMETER),
     surface_options(),
     options.TREATMENTS,
@@ -123,35 +111,32 @@ def run(args: argparse.Namespace) -> Figures:
         args.acceptance,
     )  # fmt: skip
     check_surface(surface_parameters(args))
-    lam = _known_wavelengths(args, lam)  # before a table is built
-    with mitsuba_warnings(), Bar(args) as bar:
+    surface = " and ".join(
+        f"{k}={v}" for k, v in options.given(args, ("material", "pigment")).items()
+    )
+    # before a table is built
+    lam = known(args, lam, known_range(args.material, args.pigment), f"{surface} is known")
+    with Bar(args) as bar:
         measurement = Measurement(args, geometry, lam, bar)
-        computed = _measured(measurement, groups)
-    if any(len(groups[name]) > len(kept) for name, (kept, _) in computed.items()):
-        args.code = 1
-    groups = {name: kept for name, (kept, _) in computed.items()}
+        spectra = files_of_spectra.means_of(_measured(measurement, groups))
     files = [file for members in groups.values() for file in members]
     measurement.say_notes()
-    everything = files_of_spectra.on_common_wavelengths(
-        {name: parts for name, (_, parts) in computed.items()}
-    )
-    if len(files) > 1 and everything[first][0].wavelength.size < lam.size:
-        common = everything[first][0].wavelength
-        say(f"columns are from {common[0]:g} to {common[-1]:g} nm, which every table has")
-    spectra = {name: mean_spectra(parts) for name, parts in everything.items()}
-    if all(each.error is None for each in spectra.values()):
-        files_of.pop("errors", None)
+    shown = spectra[first]
+    asked, lam = lam.size, shown.wavelength
+    if len(files) > 1 and lam.size < asked:
+        say(f"columns are from {lam[0]:g} to {lam[-1]:g} nm, which every table has")
+    columns = files_of_spectra.columns_of(spectra)
+    files_of_spectra.save_csv(output, lam, columns)
+    if errors := files_of_spectra.errors_of(spectra):
+        files_of_spectra.save_csv(files_of["errors"], lam, errors)
     else:
-        files_of_spectra.save_errors(spectra, files_of["errors"])
-    files_of_spectra.save_csv(spectra, output)
+        files_of.pop("errors", None)
     files_of_spectra.save_colours(spectra, files_of["colours"])
     if eye is not None:
         files_of_spectra.save_catches(spectra, eye, light, *(files_of[name] for name in _SEEN))
     if args.iridescence:
         files_of_spectra.save_angular(spectra, files_of["iridescence"])
     title, turned = _title(groups, args), files_of_spectra.EACH if auto and repeated else ""
-    shown = spectra[first]
-    lam = shown.wavelength
     beside = {} if measured is None else _compared(args, *measured, lam, shown.value[:, 0])
     figure = files_of_spectra.spectra_figure(spectra, title, turned, measured)
     save_figure(files_of["plot"], figure)
@@ -177,10 +162,6 @@ def run(args: argparse.Namespace) -> Figures:
                 "strongest grating's grooves, or a range of detectors (--detector -60:60:5)"
             )
             say(f"{name or title}: every column is below {_NOTHING:g} %: {why}")
-    columns = {
-        column: values.tolist()
-        for name, each in spectra.items() for column, values in each.columns(name).items()
-    }  # fmt: skip
     return {"files": written, "sources": files, "light": args.light,
             "light_azimuth": turned or shown.geometry.azimuth,
             "detectors": shown.geometry.detectors,
@@ -223,29 +204,25 @@ def _compared(
             "mean": float(known.mean()), "first": lam[both][0], "last": lam[both][-1]}  # fmt: skip
 
 
-def _measured(
-    measurement: Measurement, groups: dict[str, list[Path]]
-) -> dict[str, tuple[list[Path], list[Spectra]]]:
-    """Measure the spectra of each group; return the files that could be measured, and spectra.
+def _measured(measurement: Measurement, groups: dict[str, list[Path]]) -> dict[str, list[Spectra]]:
+    """Measure the spectra of each group.
 
-    A file among several that cannot be is said and left out.
+    A file among several that cannot be measured is said and taken out of its group.
 
     Raises a DiffractionError if no file of a group can be measured.
     """
-    measured = {}
+    spectra: dict[str, list[Spectra]] = {name: [] for name in groups}
     for name, members in groups.items():
-        kept: list[Path] = []
-        spectra: list[Spectra] = []
-        for file in members:
+        for file in [*members]:
             try:
-                spectra += measurement.of_file(file)
-                kept.append(file)
+                spectra[name] += measurement.of_file(file)
             except DiffractionError as error:
-                if file is members[-1] and not kept:
+                if members == [file]:
                     raise
+                members.remove(file)
+                measurement.args.code = 1
                 say(f"left out: {error}")
-        measured[name] = kept, spectra
-    return measured
+    return spectra
 
 
 def _files(args: argparse.Namespace, repeated: bool, output: Path) -> dict[str, Path]:
@@ -331,18 +308,3 @@ def _wavelengths(args: argparse.Namespace) -> Any:
         )
     count = int((last - first) / args.step + 1e-9) + 1
     return first + args.step * np.arange(count)
-
-
-def _known_wavelengths(args: argparse.Namespace, lam: Any) -> Any:
-    """Return the wavelengths at which the material and the pigment are known.
-
-    Raises a DiffractionError if --wavelength-range names others, or the material is unknown.
-    """
-    if args.wavelength_range is None:
-        first, last = known_range(args.material, args.pigment)
-        known = lam[(lam >= first) & (lam <= last)]
-        if known.size and known.size < lam.size:
-            say(f"material or pigment are known from {known[0]:g} to {known[-1]:g} nm alone")
-            lam = known
-    check_material(args.material, lam, args.pigment)
-    return lam

@@ -17,7 +17,7 @@ from ..scene.orbit import ORBIT
 from ..scene.parameters import CLAMP, parameters_of
 from ..scene.pictures import check_panorama
 from ..scene.stage import STUDIO
-from .options import number_between
+from .values import number_between, value
 
 #: Materials of --finish: parameters of the BSDF, that which --base sets, and its default.
 LOOKS: dict[str, tuple[dict[str, str], str, str]] = {
@@ -29,21 +29,18 @@ LOOKS: dict[str, tuple[dict[str, str], str, str]] = {
 _FRAMES, _IRRADIANCE = 24, 3.0
 
 
-def _angles(text: str) -> tuple[str, str]:
-    """Type of argument: azimuth and elevation in degrees."""
+def _angles(text: str) -> tuple[str, str] | None:
     angles = numbers_of(text) or ()
-    if len(angles) != 2 or not 0.0 <= angles[1] <= 90.0:
-        raise argparse.ArgumentTypeError(
-            f"expected azimuth and elevation in degrees, such as 120,40, got {quoted(text)}"
-        )
-    return f"{angles[0]:g}", f"{angles[1]:g}"
+    fits = len(angles) == 2 and 0.0 <= angles[1] <= 90.0
+    return (f"{angles[0]:g}", f"{angles[1]:g}") if fits else None
 
 
 #: Options of `render`; see `take_studio`.
 STUDIO_OPTIONS = (
     ("--env FILE", "panorama (HDR, EXR) that lights the scene instead of lamps"),
     ("--sun AZ,EL", "azimuth (0 right, 90 away from the camera) and elevation of a sun, degrees; "
-     "with a clear sky, or beside --env", _angles),
+     "with a clear sky, or beside --env",
+     value("azimuth and elevation in degrees, such as 120,40", _angles)),
     ("--finish", "material of --patch: metal, metal under clear lacquer, keratin over pigment; "
      "default: metal, or skin with a coloured --base", tuple(LOOKS)),
     ("--base COLOUR|FILE|METAL", "pigment of a skin: 'r,g,b', '#804020', sienna, a picture, the "

@@ -18,11 +18,11 @@ from ..scene.load import set_variant
 from ..scene.parameters import files_of
 from . import options
 from .brdf_map import MATERIAL, surface_parameters
-from .console import Bar, mitsuba_warnings, say
+from .console import Bar, say
 from .interrupt import keep_in_mind
-from .options import number_between, whole_number
 from .report import Figures, elapsed, output_of
-from .workers import THREADS, WORKERS, client_of, on_workers, say_files, worker_threads
+from .values import number_between, whole_number
+from .workers import THREADS, WORKERS, client_of, say_files, worker_threads
 
 # Ratio of the widths of scans from which on they are not compared.
 _SIZES = 1.5
@@ -59,31 +59,30 @@ def run(args: argparse.Namespace) -> Figures:
     for row in rows:
         if row["reason"]:
             say(f"{os.path.basename(row['file'])}: {row['reason']}")
-    failed = sum(bool(row["reason"]) for row in rows)
     from ..analysis.iridescence import WINDOW
 
-    wide = sorted(row["width_um"] for row in rows if not row["reason"])
+    done = [row for row in rows if not row["reason"]]
+    wide = sorted(row["width_um"] for row in done)
     if wide and wide[-1] > _SIZES * max(wide[0], WINDOW):
         say(
             f"scans are {wide[0]:.3g} to {wide[-1]:.3g} µm wide: small ones have more colour by "
             "chance; compare them with --crops 4, crops of 10 µm"
         )
-    scans = Counter(row["sample"] for row in rows if not row["reason"])
-    alone = [r for r in rows if not r["reason"] and scans[r["sample"]] == 1]
-    if any(row["width_um"] <= ONE_WINDOW for row in alone):
+    scans = Counter(row["sample"] for row in done)
+    if any(row["width_um"] <= ONE_WINDOW for row in done if scans[row["sample"]] == 1):
         say(
             "one index of a small scan is uncertain by some 15 %: its window sees one part of the "
             "surface; compare means of several scans of a sample (samples.csv)"
         )
-    whole = sum("crop" not in row for row in rows if not row["reason"])
+    whole = sum("crop" not in row for row in done)
     if args.crops is not None and whole:
         say(f"measured as a whole, without crops of {WINDOW:g} µm: {counted(whole, 'scan')}")
-    done, samples = len(rows) - failed, len({row["sample"] for row in rows})
-    measured = counted(done, "scan")
+    failed, samples = len(rows) - len(done), len({row["sample"] for row in rows})
+    measured = counted(len(done), "scan")
     if args.crops is not None:
-        measured = counted(done, "crop or whole scan", "crops and whole scans")
+        measured = counted(len(done), "crop or whole scan", "crops and whole scans")
     seconds = elapsed(args)
-    surface = next((f"{row['surface']}, " for row in rows if not row["reason"]), "")
+    surface = f"{done[0]['surface']}, " if done else ""
     print(
         f"{args.output}: {measured} in survey.csv, {failed} failed, "
         f"{counted(samples, 'sample')} in samples.csv, {surface}{seconds:.1f} s"
@@ -112,17 +111,14 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
 
     from ..analysis.survey import run_survey
 
-    treatments = load_treatments(args.treatments)
+    treatment = load_treatments(args.treatments, Treatment(own_options, settings))
     variant = set_variant(args.mode or "llvm_ad_rgb")
     check_surface(surface_parameters(args))
-    with mitsuba_warnings(), contextlib.ExitStack() as stack:
-        client = stack.enter_context(client_of(args)) if on_workers(args) else None
+    with client_of(args) as client, Bar(args, unit=" scans", delay=0) as bar:
         if client is not None:
             say_files(_read_by(args.files))
-        bar = stack.enter_context(Bar(args, unit=" scans", delay=0))
         return run_survey(
-            args.files, args.output, treatments=treatments,
-            common=Treatment(own_options, settings), variant=variant, theta=args.theta,
+            args.files, args.output, treatment=treatment, variant=variant, theta=args.theta,
             resolution=args.resolution, threads=worker_threads(args), repeats=args.repeats,
             surface=surface_parameters(args), crops=args.crops,
             client=client, progress=bar,

@@ -20,6 +20,7 @@ from . import options
 from .brdf_map import RELATIVE, gain_of
 from .console import Bar
 from .report import Figures, beside, elapsed, output_of
+from .values import STOPS, path_ending_in
 
 # Option of each sweep's own quantity.
 _SWEPT = {
@@ -38,7 +39,7 @@ _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_expos
     ("KIND", f"one of {', '.join(SWEEPS)}", tuple(SWEEPS)),
     options.SOURCE,
     ("-o --output OUT", "contact sheet; default: SOURCE's name with -KIND.png in the current "
-     "folder", options.path_ending_in(".png")),
+     "folder", path_ending_in(".png")),
     ("--values V ...", "values to compare; default: those of the thesis"),
     options.Group("the maps", (
         *options.method("flss", "what evaluates, except in a sweep over methods"),
@@ -46,7 +47,7 @@ _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_expos
         *options.SPECTRUM,
         ("--resolution N", "pixels a side", int, 128),
         ("--samples N", "directions in a pixel", int, 1),
-        ("--exposure EV", "of all maps, in stops; default: the best map's own", options.STOPS),
+        ("--exposure EV", "of all maps, in stops; default: the best map's own", STOPS),
         *options.table(options.TABLE_NAMES, coherence="patch"),
         RELATIVE,
         ("--int-ior N", "index for --relative; default: 1.5"),
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> Figures:
     output, numbers = files(output_of(args, Path(f"{args.source.stem}-{args.kind}.png"), files))
     light, values, gain = LightDirection(args.theta, args.phi), _values(args), gain_of(args)
     patch, settings = options.load_patch(args)
-    settings |= options.wavelengths(args)
+    settings |= {"wavelength_range": args.wavelength_range, "step": args.step}
     if args.period is not None:
         settings["period"] = args.period
     if values is None and args.kind == "method" and gain is not None:

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import counted
 from . import options
-from .console import Bar, mitsuba_warnings, say_warning
-from .options import number_between, path_ending_in
+from .console import Bar, say_warning
 from .report import Figures, check_outputs
+from .values import number_between, path_ending_in
 
 if TYPE_CHECKING:
     from ..scene.orientation.tangents import TangentReport
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> Figures:
     from ..scene.orientation.tangents import check_tangents
     from ..scene.orientation.trimesh import oriented_mesh, turned
 
-    with Bar(args) as bar, mitsuba_warnings():
+    with Bar(args) as bar:
         bar(0, 0, "reading")
         read = load_mesh(args.mesh)
         arrays = read.positions, read.normals, read.faces

@@ -10,6 +10,7 @@ from ..scene import set_variant
 from ..scene.pictures import read_exr, write_png
 from . import options
 from .report import Figures, output_of
+from .values import STOPS, path_ending_in
 
 
 @options.command(
@@ -18,8 +19,8 @@ from .report import Figures, output_of
     "than it was rendered with.",
     ("FILE.exr", "linear picture", Path, None, {"dest": "picture"}),
     ("-o --output OUT", "PNG to write; default: beside the EXR, with its name",
-     options.path_ending_in(".png")),
-    ("--exposure EV", "stops: +1 doubles the light", options.STOPS, 0.0),
+     path_ending_in(".png")),
+    ("--exposure EV", "stops: +1 doubles the light", STOPS, 0.0),
     options.VIEW,
 )  # fmt: skip
 def run(args: argparse.Namespace) -> Figures:

@@ -19,8 +19,9 @@ from ..analysis.tradeoff import (
     settings,
 )
 from ..analysis.tradeoff.accuracy import Sample
-from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
+from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain
 from ..atomic import make_folder
+from ..columns import save_rows
 from ..errors import DiffractionWarning
 from ..heights import Source, gratings
 from ..heights.coherence import resolved_width
@@ -28,8 +29,8 @@ from ..scene import set_variant
 from ..tables import DiffractionTable
 from . import options
 from .console import Bar
-from .options import number_between
 from .report import Figures, output_of, save_json
+from .values import number_between
 
 #: Pixels of the default patch along an axis, pairs of directions, calls in a kernel launch, timed
 #: launches, height scales.
@@ -85,7 +86,7 @@ def run(args: argparse.Namespace) -> Figures:
         best = recommended(results, budget)
         finest = DiffractionTable.build(field, coherence_width=width, tolerance=1e-4)
         sample = Sample.draw(field, width, "ensemble", min(pairs, 160), bar)
-        spectral = measure_wavelengths(finest, sample.wi, sample.wo)
+        spectral = measure_wavelengths(finest, *sample.pairs[:2])
         deep = measure_depths(depths, bar)
     make_folder(args.output)
     title = (
@@ -101,7 +102,8 @@ def run(args: argparse.Namespace) -> Figures:
     }
     document |= plain(results, deep)
     save_json(args.output / "tradeoff.json", document)
-    save_csv(args.output / "tradeoff.csv", document["settings"])
+    names = [name for name in document["settings"][0] if name != "arguments"]
+    save_rows(args.output / "tradeoff.csv", names, document["settings"])
     print("\n".join(lines(results, spectral, best, budget)))
     print(f"wrote {args.output / 'tradeoff'}.json, .csv, .png and depth.png")
     return document

@@ -17,7 +17,8 @@ from ..cluster.workers import VARIABLE
 from ..errors import counted
 from ..system import cores
 from .console import Bar, say
-from .options import Group, refuse, whole_number
+from .options import Group, refuse
+from .values import whole_number
 
 if TYPE_CHECKING:
     from ..orders.solve.jobs import Calls
@@ -54,7 +55,10 @@ def worker_threads(args: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def client_of(args: argparse.Namespace) -> Iterator[Any]:
-    """Connect to the requested workers, and print the address of their pages."""
+    """Connect to the requested workers, and print the address of their pages; None without any."""
+    if not on_workers(args):
+        yield None
+        return
     has_page = importlib.util.find_spec("bokeh") is not None
     with connect(args.workers, args.scheduler) as client:
         if not args.workers or has_page:
@@ -62,28 +66,28 @@ def client_of(args: argparse.Namespace) -> Iterator[Any]:
         yield client
 
 
+@contextlib.contextmanager
 def film_of(
-    args: argparse.Namespace, client: Any, frames: Sequence[FrameRequest], variant: str, keep: Path
-) -> FrameSequence:
-    """Return the renderer of the command's frames on workers."""
-    with Bar(args, delay=0) as bar:
-        bar(0, 0, "loading")
-        film = FrameSequence(
-            client, args.scene, frames, variant, keep=keep, sensor=args.sensor,
-            preview=args.preview, threads=worker_threads(args),
-        )  # fmt: skip
-    say_files(path for task in film.frames for path, _ in task.files.files)
-    say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
-    return film
+    args: argparse.Namespace, frames: Sequence[FrameRequest], variant: str, keep: Path
+) -> Iterator[FrameSequence]:
+    """Connect to the requested workers, and yield the renderer of the command's frames on them."""
+    with client_of(args) as client:
+        with Bar(args, delay=0) as bar:
+            bar(0, 0, "loading")
+            film = FrameSequence(
+                client, args.scene, frames, variant, keep=keep, sensor=args.sensor,
+                preview=args.preview, threads=worker_threads(args),
+            )  # fmt: skip
+        say_files(path for task in film.frames for path, _ in task.files.files)
+        say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
+        yield film
 
 
 def say_files(files: Iterable[str | os.PathLike[str]]) -> None:
     """Print the files that are sent to workers without them, before the first is sent."""
     here = Path.cwd()
-    names = []
-    for file in sorted({Path(os.path.abspath(file)) for file in files}):
-        inside = file.is_relative_to(here)
-        names.append(str(file.relative_to(here) if inside else file))
+    sent = sorted({Path(os.path.abspath(file)) for file in files})
+    names = (str(file.relative_to(here) if file.is_relative_to(here) else file) for file in sent)
     say(f"files for workers that lack them: {', '.join(names)}")
 
 

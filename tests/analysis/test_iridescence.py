@@ -17,6 +17,7 @@ from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.analysis.scans import bsdf_of
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.tables import DiffractionTable
+from tests.analysis.perfect import perfect
 from tests.support.lanes import interaction, vectors
 
 LIGHT = LightDirection(30.0, 0.0)
@@ -24,7 +25,8 @@ LIGHT = LightDirection(30.0, 0.0)
 
 def light_of(field, light=LIGHT, **settings):
     settings = {"tolerance": 0.01, "wavelength_range": (380.0, 780.0), **settings}
-    (found,) = diffracted_light(DiffractionTable.build(field, **settings), light)
+    table = DiffractionTable.build(field, **settings)
+    (found,) = diffracted_light(table, light, perfect(light))
     return found
 
 

@@ -15,8 +15,9 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.analysis.spectra import check_wavelengths, mean_spectra
 from mitsuba_diffraction.analysis.spectra_files import (
     colour_of,
+    columns_of,
+    errors_of,
     save_csv,
-    save_errors,
     spectra_figure,
 )
 from mitsuba_diffraction.analysis.spectrometer import STEEPEST, MeasurementGeometry
@@ -104,8 +105,8 @@ def test_means_have_standard_errors_and_files_have_columns(tmp_path):
     assert mean.value == pytest.approx(0.75, rel=1e-5)
     assert mean.error == pytest.approx(0.25, rel=1e-5)
     assert mean_spectra([white]) is white
-    save_csv({"": mean}, tmp_path / "s.csv")
-    save_errors({"": mean}, tmp_path / "e.csv")
+    save_csv(tmp_path / "s.csv", mean.wavelength, columns_of({"": mean}))
+    save_csv(tmp_path / "e.csv", mean.wavelength, errors_of({"": mean}))
     rows = np.genfromtxt(tmp_path / "s.csv", delimiter=",", names=True)
     assert rows.dtype.names[:2] == ("wl", "light30_detector30")
     assert rows["wl"] == pytest.approx(LAM)
@@ -114,7 +115,7 @@ def test_means_have_standard_errors_and_files_have_columns(tmp_path):
     assert errors["light30_detector30"] == pytest.approx(25.0, rel=1e-4)
     red, green, blue = colour_of(mean)[0]
     assert np.ptp([red, green, blue]) < 0.2  # four wavelengths make almost a grey
-    axes = spectra_figure(mean, "a scan").axes[0]
+    axes = spectra_figure({"": mean}, "a scan").axes[0]
     assert "nm" in axes.get_xlabel()
     assert "%" in axes.get_ylabel()
 

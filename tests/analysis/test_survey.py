@@ -17,8 +17,9 @@ from mitsuba_diffraction.analysis.iridescence import light_and_chance
 from mitsuba_diffraction.analysis.maps.result import LightDirection
 from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
 from mitsuba_diffraction.analysis.survey import ranked, run_survey
-from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
+from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles
+from tests.analysis.perfect import perfect
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -41,14 +42,12 @@ def scans(tmp_path):
 
 @pytest.fixture
 def survey(scans, tmp_path):
-    own = Treatment().updated(Treatment(settings=SMALL))
-    options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
+    text = f'["*.npy"]\npixel_size = {PIXEL}\n'
+    treatment = load_treatments(_toml(tmp_path, text), Treatment(settings=SMALL))
 
     def call(files=scans, **more):
         out = tmp_path / "out"
-        return run_survey(
-            files, out, treatments=options, common=own, resolution=32, theta=20.0, **more
-        )
+        return run_survey(files, out, treatment=treatment, resolution=32, theta=20.0, **more)
 
     return call
 
@@ -99,12 +98,10 @@ def test_rows_have_periods_to_a_percent_and_a_second_run_measures_only_what_is_n
 
 def test_heights_that_an_option_scales_say_so_and_a_flat_scan_is_last(scans, tmp_path):
     np.save(tmp_path / "flat.npy", np.zeros((40, 40)))
-    own = Treatment(settings=SMALL)
-    options = load_treatments(
-        _toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n["s*.npy"]\nmax_height = 0.1\n')
-    )
-    rows = run_survey([tmp_path / "flat.npy", scans[0]], tmp_path / "two", treatments=options,
-                      common=own, resolution=32)  # fmt: skip
+    text = f'["*.npy"]\npixel_size = {PIXEL}\n["s*.npy"]\nmax_height = 0.1\n'
+    treatment = load_treatments(_toml(tmp_path, text), Treatment(settings=SMALL))
+    files, folder = [tmp_path / "flat.npy", scans[0]], tmp_path / "two"
+    rows = run_survey(files, folder, treatment=treatment, resolution=32)
     flat, grating = rows
     assert "overrides" not in flat["warnings"]
     assert flat["ranked_among"] == "scans below 10 µm"
@@ -114,8 +111,8 @@ def test_heights_that_an_option_scales_say_so_and_a_flat_scan_is_last(scans, tmp
 
 def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path):
     own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
-    options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
-    (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, common=own, resolution=8)
+    treatment = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'), own)
+    (row,) = run_survey(scans[:1], tmp_path / "out", treatment=treatment, resolution=8)
     assert "starts at 500 nm" in row["reason"]
 
 
@@ -135,11 +132,12 @@ def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
         tmp_path,
         '["*.png"]\npixel_size = 0.1\nlevel = "plane"\n["b*"]\nlevel = "lines"\ntolerance = 0.1\n',
     )
-    found = treatment_for(Path("in/b.png"), load_treatments(path))
+    treatment = load_treatments(path)
+    found = treatment(Path("in/b.png"))
     assert found.options.pixel_size == (0.1, 0.1)
     assert found.options.level == "lines"
     assert found.settings == {"tolerance": 0.1}
-    assert treatment_for(Path("in/c.npy"), load_treatments(path)) == Treatment()
+    assert treatment(Path("in/c.npy")) == Treatment()
 
 
 @pytest.mark.parametrize("text", ["level = 1", '["*"]\nheight = 2', '["*"]\nlevel = "sea"', "["])
@@ -217,7 +215,7 @@ def test_chance_explains_an_unordered_surface_and_not_a_grating():
     light = LightDirection(30.0, 0.0)
     for field, above in ((rough, 1.25), (grating, 1.3)):
         table = DiffractionTable.build(field, coherence_width=10.0, tolerance=0.01)
-        diffracted, chance = light_and_chance(table, light)
+        diffracted, chance = light_and_chance(table, light, perfect(light))
         index = diffracted.iridescence()
         # chance differs by some 10 % from patch to patch
         assert (index > above * chance) == (field is grating), (index, chance)
@@ -231,7 +229,8 @@ def test_a_grating_ranks_alike_at_any_angle_and_number_of_periods():
         waves = np.sin(2 * np.pi * periods / 10.24 * (c * x + s * x[:, None]))
         field = HeightField(0.015 * waves, 0.08, cut_out=True)
         table = DiffractionTable.build(field, tolerance=0.01)
-        diffracted, chance = light_and_chance(table, LightDirection(30.0, turn))
+        light = LightDirection(30.0, turn)
+        diffracted, chance = light_and_chance(table, light, perfect(light))
         index = diffracted.iridescence()
         # a grating's own leakage around its lobes is no unordered surface
         assert chance < 0.1 * index, (periods, turn)

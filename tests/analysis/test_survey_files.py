@@ -3,77 +3,82 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.analysis.survey import _stored_row
+from mitsuba_diffraction.analysis.survey import Measured, _store, _stored_row
 from mitsuba_diffraction.analysis.survey_files import write_sheets
 from mitsuba_diffraction.columns import save_rows
 
 JOB = SimpleNamespace(key="0" * 32)
+STEM = f"a-{JOB.key}"
 ROW = {
-    "reason": "", "width_um": 12.0, "iridescence": 0.1, "iridescence_by_chance": 0.02,
-    "iridescent_light": 0.05, "tiling": "", "ranked_among": "scans from 10 µm", "patches": 1,
-    "table": f"scans/a-{JOB.key}.exr", "map": f"scans/a-{JOB.key}.png",
+    "reason": "", "width_um": 12.0, "iridescence": 0.1, "iridescence_by_chance": 1.0 / 3.0,
+    "iridescent_light": 0.05, "tiling": "", "patches": 1,
 }  # fmt: skip
+SHOWN = ROW | {"table": f"scans/{STEM}.exr", "map": f"scans/{STEM}.png"}
 
 
 @pytest.fixture
 def scans(tmp_path):
-    """A folder with a scan's map and table."""
-    folder = tmp_path / "scans"
+    """A folder with a scan's row, map and table."""
+    folder, picture = tmp_path / "scans", io.BytesIO()
     folder.mkdir()
-    Image.fromarray(np.zeros((4, 4, 4), np.uint8), "RGBA").save(folder / f"a-{JOB.key}.png")
-    (folder / f"a-{JOB.key}.exr").touch()
+    Image.fromarray(np.zeros((4, 4, 4), np.uint8), "RGBA").save(picture, "PNG")
+    files = {".png": picture.getvalue(), ".exr": b"a table"}
+    assert _store(folder, Path("a.npy"), JOB, Measured(ROW, files)) == SHOWN
     return folder
 
 
-def _write(scans, text):
-    (scans / f"a-{JOB.key}.json").write_text(text)
+def test_a_stored_row_is_read_with_the_files_beside_it(scans, tmp_path):
+    assert _stored_row(scans, JOB) == SHOWN
+    write_sheets(tmp_path, [{"file": "a", **_stored_row(scans, JOB)}])
+    assert (tmp_path / "sheet.png").exists()
 
 
-def test_a_stored_row_is_read(scans):
-    _write(scans, json.dumps(ROW))
-    assert _stored_row(scans, JOB) == ROW
+def test_the_row_of_a_scan_that_cannot_be_read_has_no_files(tmp_path):
+    failed = {"reason": "'a.npy' is damaged", "time_s": 0.1}
+    assert _store(tmp_path, Path("a.npy"), JOB, Measured(failed, {})) == failed
+    assert _stored_row(tmp_path, JOB) == failed
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        "", "[]", "null", "{}", '"reason"', "[" * 5000, '{"reason": ""}', '{"reason": 1}',
-        json.dumps(ROW | {"iridescence": "much"}), json.dumps(ROW | {"tiling": 3}),
-        json.dumps(ROW | {"width_um": {}}), json.dumps(ROW | {"patches": 10**400}),
-        json.dumps(ROW | {"period_1_um": 1.0}), json.dumps(ROW | {"iridescence": True}),
-        json.dumps({k: v for k, v in ROW.items() if k != "width_um"}),
+        "", "[]", "null", "{}", '"reason"', "[" * 5000, '[{"reason": ""}, ""]', "[1, 2]",
+        json.dumps(ROW), json.dumps([ROW, ""]), json.dumps([ROW | {"reason": "failed"}, ""]),
         '{"reason": "", "patches": ' + 5000 * "9" + "}", "\u0000",
     ],
 )  # fmt: skip
 def test_a_damaged_row_is_measured_again(scans, text):
-    _write(scans, text)
+    (scans / f"{STEM}.json").write_text(text)
     assert _stored_row(scans, JOB) is None
 
 
-@pytest.mark.parametrize("name", ["../private.png", "/etc/hostname", "scans/../../private.png"])
-def test_a_row_shows_the_scans_own_map_whatever_it_names(scans, tmp_path, name):
-    Image.fromarray(np.full((4, 4, 3), 255, np.uint8)).save(tmp_path.parent / "private.png")
-    _write(scans, json.dumps(ROW | {"map": name, "table": name}))
-    assert _stored_row(scans, JOB) == ROW
-    write_sheets(tmp_path, [{"file": "a", **_stored_row(scans, JOB)}])
-    assert (tmp_path / "sheet.png").exists()
-
-
-def test_a_map_that_is_a_link_or_no_picture_is_measured_again(scans, tmp_path):
-    _write(scans, json.dumps(ROW))
-    picture = scans / f"a-{JOB.key}.png"
-    picture.rename(tmp_path / "elsewhere.png")
-    picture.symlink_to(tmp_path / "elsewhere.png")
+@pytest.mark.parametrize(("old", "new"), [("12.0", "12.5"), ('"tiling": ""', '"tiling": 3'),
+                                          ('"width_um": 12.0, ', ""), ("0.1", "true")])  # fmt: skip
+def test_a_changed_row_is_measured_again(scans, old, new):
+    file = scans / f"{STEM}.json"
+    text = file.read_text("utf-8")
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
     assert _stored_row(scans, JOB) is None
-    picture.unlink()
-    picture.write_bytes(b"\x89PNG\r\n\x1a\n and no more")
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_a_row_with_other_files_is_measured_again(scans, tmp_path, suffix):
+    """As a link to a picture that somebody else may not see."""
+    file, other = scans / f"{STEM}{suffix}", tmp_path / "elsewhere"
+    file.unlink()
+    assert _stored_row(scans, JOB) is None
+    other.write_bytes(b"of somebody else")
+    file.symlink_to(other)
     assert _stored_row(scans, JOB) is None
 
 

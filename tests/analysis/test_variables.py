@@ -82,6 +82,7 @@ def test_white_has_no_chroma_and_black_no_colour():
 def test_a_single_wavelength_is_drawn_as_points(detectors):
     geometry = MeasurementGeometry(30.0, tuple(5.0 * np.arange(detectors)))
     value = np.full((1, detectors), 0.3)
-    (axes,) = spectra_figure(Spectra(np.array([633.0]), value, geometry, "white")).axes
+    spectra = Spectra(np.array([633.0]), value, geometry, "white")
+    (axes,) = spectra_figure({"": spectra}).axes
     assert len(axes.lines) == detectors
     assert {line.get_marker() for line in axes.lines} == {"o"}

@@ -11,12 +11,11 @@ from mitsuba_diffraction.cli.main import Parser
 from mitsuba_diffraction.cli.options import (
     add_options,
     given,
-    limits,
     option_of,
     refuse,
-    whole_number,
 )
 from mitsuba_diffraction.cli.spellings import current
+from mitsuba_diffraction.cli.values import limits, whole_number
 
 
 @pytest.fixture

@@ -121,7 +121,7 @@ def test_short_work_is_silent(capfd):
 def test_mitsuba_s_warnings_are_ours_and_said_once(capfd):
     mi.set_variant("scalar_rgb")
     count = mi.logger().appender_count()
-    with console.mitsuba_warnings():
+    with console.warnings_in_one_line():
         for _ in range(2):
             mi.Log(mi.LogLevel.Warn, "too few\nsamples")
         mi.Log(mi.LogLevel.Info, "of no interest")

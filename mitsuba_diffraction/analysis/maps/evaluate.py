@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -93,8 +95,10 @@ def brdf_map(
     narrowest = 0.5 if sigma is None else 1 / (2**0.5 * sigma * float(wavenumber(bands.low)))
     if samples is None:
         samples = hemisphere.samples_for(resolution, narrowest)
-    sums = _Sums(bands, illuminant, cosine, spectral)
-    coverage, values = _over_pixels(bsdf, light, resolution, samples, sums, progress or silent)
+    kept = bands.count if spectral or bands.is_single else 0
+    add = partial(_add, bsdf, bands=bands, illuminant=illuminant, cosine=cosine)
+    count = (0 if bands.is_single else 3) + kept
+    coverage, values = _over_pixels(add, count, light, resolution, samples, progress or silent)
     if mi.is_rgb:
         to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
         values = np.moveaxis(np.moveaxis(values, 0, -1) @ to_xyz, -1, 0).astype(np.float32)
@@ -103,7 +107,7 @@ def brdf_map(
         bands=bands,
         coverage=coverage,
         xyz=None if bands.is_single else np.moveaxis(values[:3], 0, -1),
-        spectrum=values[0 if bands.is_single else 3 :] if sums.keeps_bands else None,
+        spectrum=values[count - kept :] if kept else None,
         cosine=cosine,
         illuminant=illuminant,
         samples=samples,
@@ -129,9 +133,7 @@ def check_variant(bands: Bands, illuminant: str, spectral: bool) -> None:
 
 def check_map(bands: Bands, resolution: int, samples: int | None, spectral: bool) -> None:
     """Refuse numbers of pixels, samples and bands that are out of range or need too much memory."""
-    hemisphere.check_resolution(resolution)
-    if samples is not None:
-        hemisphere.check_samples(samples)
+    hemisphere.check_pixels(resolution, samples)
     if spectral and resolution**2 * bands.count > _MOST_NUMBERS:
         raise DiffractionError(
             f"a spectral map of {resolution}² pixels and {bands.count} bands requires "
@@ -139,77 +141,60 @@ def check_map(bands: Bands, resolution: int, samples: int | None, spectral: bool
         )
 
 
-class _Sums:
-    """Sums over wavelengths: tristimulus values, bands or both, with one kernel for all packets.
+def _add(
+    bsdf: Any, totals: list[Any], si: Any, wo: Any, active: Any, offset: float, *,
+    bands: Bands, illuminant: str, cosine: bool,
+) -> None:  # fmt: skip
+    """Add one sample of each pixel to its totals: X, Y, Z, bands, or both; or R, G, B.
 
-    In RGB variants, linear sRGB of the whole spectrum.
+    All packets of wavelengths have one kernel. In RGB variants the totals are linear sRGB of the
+    whole spectrum.
+
+    Parameters
+    ----------
+    totals : variables mi.Float; changed in place.
+    offset : position of the wavelength in each band, 0 to 1.
     """
-
-    def __init__(self, bands: Bands, illuminant: str, cosine: bool, spectral: bool) -> None:
-        self.bands, self.illuminant, self.cosine = bands, illuminant, cosine
-        self.colours, self.keeps_bands = not bands.is_single, spectral or bands.is_single
-        self.count = (3 if self.colours else 0) + (bands.count if self.keeps_bands else 0)
-        self._context = mi.BSDFContext()
-
-    def _value(self, bsdf: Any, si: Any, wo: Any, active: Any) -> Any:
-        """Return f, or f·cosθo."""
-        f = bsdf.eval(self._context, si, wo, active)
-        return f if self.cosine else f * dr.rcp(wo.z)
-
-    def add(
-        self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
-    ) -> None:
-        """Add one sample of each pixel to its totals: X, Y, Z, bands, or both; or R, G, B.
-
-        Parameters
-        ----------
-        totals : `count` variables mi.Float; changed in place.
-        offset : position of the wavelength in each band, 0 to 1.
-        """
-        if mi.is_rgb:
-            f = self._value(bsdf, si, wo, active)
-            for n in range(3):
-                totals[n] += f[n]
-            dr.eval(totals)
-            return
-        packet = len(mi.Spectrum())
-        wavelengths = self.bands.wavelengths(offset)
-        weights = (
-            response(wavelengths, self.illuminant) * self.bands.width if self.colours else None
-        )
-        for first in range(0, self.bands.count, packet):
-            # the last packet is padded with wavelengths of weight 0
-            index = np.minimum(np.arange(first, first + packet), self.bands.count - 1)
-            used = min(packet, self.bands.count - first)
-            # opaque, since every literal would compile another kernel
-            si.wavelengths = mi.Spectrum(opaque(wavelengths[index]))
-            f = self._value(bsdf, si, wo, active)
-            if weights is not None:
-                padded = weights[index] * (np.arange(packet) < used)[:, None]
-                for n in range(3):
-                    totals[n] += dr.dot(mi.Spectrum(opaque(padded[:, n])), f)
-            if self.keeps_bands:
-                start = self.count - self.bands.count + first
-                for n in range(used):
-                    totals[start + n] += f[n]
-                dr.eval(totals[start : start + used])
-            dr.eval(totals[:3])
+    context, over = mi.BSDFContext(), 1.0 if cosine else dr.rcp(wo.z)
+    if mi.is_rgb:
+        f = bsdf.eval(context, si, wo, active) * over
+        for n in range(3):
+            totals[n] += f[n]
+        dr.eval(totals)
+        return
+    packet, start = len(mi.Spectrum()), 0 if bands.is_single else 3
+    wavelengths = bands.wavelengths(offset)
+    weights = response(wavelengths, illuminant) * bands.width
+    for first in range(0, bands.count, packet):
+        # the last packet is padded with wavelengths of weight 0
+        index = np.minimum(np.arange(first, first + packet), bands.count - 1)
+        used = min(packet, bands.count - first)
+        # opaque, since every literal would compile another kernel
+        si.wavelengths = mi.Spectrum(opaque(wavelengths[index]))
+        f = bsdf.eval(context, si, wo, active) * over
+        padded = weights[index] * (np.arange(packet) < used)[:, None]
+        for n in range(start):
+            totals[n] += dr.dot(mi.Spectrum(opaque(padded[:, n])), f)
+        here = range(start + first, min(start + first + used, len(totals)))
+        for n in here:  # none where bands are not kept
+            totals[n] += f[n - here.start]
+        dr.eval(totals[here.start : here.stop], totals[:3])
 
 
 def _over_pixels(
-    bsdf: Any,
+    add: Callable[..., None],
+    count: int,
     light: LightDirection,
     resolution: int,
     samples: int,
-    sums: _Sums,
     progress: Progress,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the means over each pixel: coverage (n, n) and sums (count, n, n)."""
+    """Return the means over each pixel: coverage (n, n) and sums (count, n, n) of `add`."""
     inside = hemisphere.inside(resolution)
     low, size = hemisphere.corners(resolution), 2.0 / resolution
     rows, columns = np.nonzero(inside)
     coverage = np.zeros((resolution, resolution), np.float32)
-    values = np.zeros((sums.count, resolution, resolution), np.float32)
+    values = np.zeros((count, resolution, resolution), np.float32)
     pattern = hemisphere.sub_samples(samples)
     chunks = -(-rows.size // LAUNCH_PIXELS)
     for chunk in range(chunks):
@@ -217,7 +202,7 @@ def _over_pixels(
         x0, y0 = (upload(mi.Float, low[index[part]]) for index in (columns, rows))
         hit = dr.zeros(mi.Float, dr.width(x0))
         si = hemisphere.flat_interaction(mi.Vector3f(opaque(light.direction)), dr.width(x0))
-        totals = [dr.zeros(mi.Float, dr.width(x0)) for _ in range(sums.count)]
+        totals = [dr.zeros(mi.Float, dr.width(x0)) for _ in range(count)]
         for n, (shift_x, shift_y, offset) in enumerate(pattern):
             progress(chunk * samples + n, chunks * samples, "evaluating")
             shift = opaque(np.array([shift_x, shift_y]) * size)
@@ -227,7 +212,7 @@ def _over_pixels(
             wo = mi.Vector3f(x, y, dr.sqrt(dr.select(active, z2, 1.0)))
             hit += dr.select(active, 1.0, 0.0)
             dr.eval(wo, active, hit)
-            sums.add(totals, bsdf, si, wo, active, float(offset))
+            add(totals, si, wo, active, float(offset))
             dr.sync_thread()  # so that Ctrl-C need not wait for queued kernels
         coverage[rows[part], columns[part]] = np.array(hit) / samples
         for total, value in zip(totals, values, strict=True):

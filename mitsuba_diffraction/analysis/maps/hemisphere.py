@@ -46,17 +46,13 @@ def flat_interaction(wi: Any, count: int) -> Any:
     return si
 
 
-def check_resolution(resolution: int) -> None:
-    """Refuse a number of pixels that is out of range."""
+def check_pixels(resolution: int, samples: int | None) -> None:
+    """Refuse numbers of pixels, and of samples in a pixel, that are out of range."""
     if not SMALLEST <= resolution <= LARGEST:
         raise DiffractionError(
             f"resolution={resolution} must be from {SMALLEST} to {LARGEST} pixels"
         )
-
-
-def check_samples(samples: int) -> None:
-    """Refuse a number of samples per pixel that is out of range."""
-    if not 1 <= samples <= MOST_SAMPLES:
+    if samples is not None and not 1 <= samples <= MOST_SAMPLES:
         raise DiffractionError(f"samples={samples} must be from 1 to {MOST_SAMPLES} in a pixel")
 
 

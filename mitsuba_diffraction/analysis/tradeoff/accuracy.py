@@ -37,54 +37,6 @@ KAPPA = q_limit_of((380.0, 780.0))
 _SIDE, _PIXEL = 48, 0.1  # pixels a side of the patch whose depth varies, and their size, µm
 
 
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """Pairs of directions and wavelengths with the exact window sum of each."""
-
-    # (n, 3), exact in single precision
-    wi: Real
-    wo: Real
-    wavelength: Real  # (n,) nm, exact in single precision
-    near: NDArray[np.bool_]  # (n,) whether the pair lies within 3/σ of order 0
-    exact: Real  # (n,) ⟨|P|²⟩ / 4π²σ⁴ by `reference`, in double precision
-
-    @classmethod
-    def draw(
-        cls,
-        field: HeightField,
-        coherence_width: float,
-        coherence: str,
-        n: int,
-        progress: Progress,
-    ) -> Sample:
-        """Draw n pairs of directions, and compute exact window sums from all pixels."""
-        sigmas = sigmas_of(coherence_width, field, coherence)
-        pairs = lit_pairs(field, sigma_of(coherence_width), n, seed=20140113)
-        exact = np.empty(n)
-        for i in range(n):
-            wi, wo, wavelength = (values[i : i + 1] for values in pairs[:3])
-            exact[i] = window_power(field, wi, wo, wavelength, sigmas, coherence)[0]
-            progress(i + 1, n, f"the exact answer, {coherence}")
-        return cls(*pairs, exact / (4.0 * np.pi**2 * sigmas.orders**4))
-
-    def error(self, sums: Real) -> tuple[float, float]:
-        """Return Σ|sums − exact| / Σ exact, near order 0 and elsewhere."""
-        difference = np.abs(sums - self.exact)
-        parts = self.near, ~self.near
-        near, far = (float(difference[p].sum() / self.exact[p].sum()) for p in parts)
-        return near, far
-
-    def window_sums(self, table: DiffractionTable) -> Real:
-        """Look up the window sums (n,) of the pairs in a table, in double precision."""
-        return _window_sums(table, self.wi, self.wo, self.wavelength)
-
-
-def _window_sums(table: DiffractionTable, wi: Real, wo: Real, wavelength: Real) -> Real:
-    """Return window sums of pairs (…, 3) at wavelengths that their shape is broadcast with."""
-    k, (u, v, w) = wavenumber(wavelength), diffraction_coordinates(wi, wo)
-    return table.window_sum(k * u, k * v, k * w)
-
-
 def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) -> Real:
     """Draw unit vectors (n, 3), uniform above cosθ = lowest, exact in single precision."""
     z = rng.uniform(lowest, 1.0, n)
@@ -152,6 +104,45 @@ def lit_pairs(field: HeightField, sigma: float, n: int, seed: int) -> LitPairs:
     return LitPairs(wi, wo, lam, near)
 
 
+class Sample(NamedTuple):
+    """Pairs of directions and wavelengths, and ⟨|P|²⟩ / 4π²σ⁴ of each by `reference`, (n,)."""
+
+    pairs: LitPairs
+    exact: Real  # in double precision
+
+    @classmethod
+    def draw(
+        cls,
+        field: HeightField,
+        coherence_width: float,
+        coherence: str,
+        n: int,
+        progress: Progress,
+    ) -> Sample:
+        """Draw n pairs of directions, and compute exact window sums from all pixels."""
+        sigmas = sigmas_of(coherence_width, field, coherence)
+        pairs = lit_pairs(field, sigma_of(coherence_width), n, seed=20140113)
+        exact = np.empty(n)
+        for i in range(n):
+            wi, wo, wavelength = (values[i : i + 1] for values in pairs[:3])
+            exact[i] = window_power(field, wi, wo, wavelength, sigmas, coherence)[0]
+            progress(i + 1, n, f"the exact answer, {coherence}")
+        return cls(pairs, exact / (4.0 * np.pi**2 * sigmas.orders**4))
+
+    def error(self, sums: Real) -> tuple[float, float]:
+        """Return Σ|sums − exact| / Σ exact, near order 0 and elsewhere."""
+        difference = np.abs(sums - self.exact)
+        parts = self.pairs.near, ~self.pairs.near
+        near, far = (float(difference[p].sum() / self.exact[p].sum()) for p in parts)
+        return near, far
+
+
+def window_sums(table: DiffractionTable, wi: Real, wo: Real, wavelength: Real) -> Real:
+    """Return window sums of pairs (…, 3) at wavelengths that their shape is broadcast with."""
+    k, (u, v, w) = wavenumber(wavelength), diffraction_coordinates(wi, wo)
+    return table.window_sum(k * u, k * v, k * w)
+
+
 @dataclass(frozen=True)
 class Spectral:
     """Colour error of sums over wavelengths, and noise of rays."""
@@ -167,7 +158,7 @@ def measure_wavelengths(
     lam = np.arange(_FIRST, _LAST, _FINEST) + 0.5 * _FINEST
     # window sums over λ², up to a factor, (pairs, wavelengths)
     k = wavenumber(lam)
-    spectrum = _window_sums(table, wi[:, None], wo[:, None], lam) * (k / k.mean()) ** 2
+    spectrum = window_sums(table, wi[:, None], wo[:, None], lam) * (k / k.mean()) ** 2
     weights = linear_srgb(response(lam))
     exact = spectrum @ weights * _FINEST
     lit = exact.max(axis=1) > 1e-4 * exact.max()

@@ -19,7 +19,7 @@ from ...progress import Progress, silent
 from ...tables import DiffractionTable
 from ...tables.colour.table import power_colour_difference
 from ..timing import Queries, kernel_seconds, quiet_bsdf, ratio, rounds_of
-from .accuracy import Sample
+from .accuracy import LitPairs, Sample, window_sums
 
 
 @dataclass(frozen=True)
@@ -140,8 +140,8 @@ def measure(
         results.append(
             MeasuredSetting(
                 setting,
-                error=max(sample.error(sample.window_sums(table))),
-                error_single=max(sample.error(_by_plugin(bsdf, sample))),
+                error=max(sample.error(window_sums(table, *sample.pairs[:3]))),
+                error_single=max(sample.error(_by_plugin(bsdf, sample.pairs))),
                 delta_e=float(loss.mean()),
                 delta_e_99=float(np.percentile(loss, 99.0)),
                 taps=table.grid.taps_read,
@@ -164,10 +164,10 @@ def measure(
     ]  # fmt: skip
 
 
-def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
+def _by_plugin(bsdf: Any, pairs: LitPairs) -> NDArray[np.float64]:
     """Return the window sums (n,) by the plugin, in single precision."""
-    k = 2e3 * np.pi / sample.wavelength
-    total = mi.Vector3f((sample.wi + sample.wo).T)
+    k = 2e3 * np.pi / pairs.wavelength
+    total = mi.Vector3f((pairs.wi + pairs.wo).T)
     device = bsdf.power.device
     wavenumber = upload(mi.Float, k)
     sums = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)

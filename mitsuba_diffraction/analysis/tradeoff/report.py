@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...columns import save_rows
 from ...errors import DiffractionError
 from ...images import save_figure
 from .accuracy import Depths, Spectral
@@ -87,11 +86,6 @@ def plain(results: list[MeasuredSetting], depths: Depths) -> dict[str, Any]:
             "intervals": depths.intervals.tolist(),
         },
     }  # fmt: skip
-
-
-def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
-    """Write a CSV with a row for each setting of `plain`."""
-    save_rows(path, [name for name in settings[0] if name != "arguments"], settings)
 
 
 def lines(

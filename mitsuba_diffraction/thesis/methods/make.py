@@ -200,8 +200,7 @@ def method_map(
     gain : map the thesis' relative reflectance with this gain factor instead of f.
     progress : called as progress(done, total, text).
     """
-    hemisphere.check_resolution(resolution)
-    hemisphere.check_samples(samples)
+    hemisphere.check_pixels(resolution, samples)
     bands = Bands.choose(method.wavelength_range, step, wavelength)
     rows, columns = np.nonzero(hemisphere.inside(resolution))
     low, size = hemisphere.corners(resolution), 2.0 / resolution

@@ -14,9 +14,8 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.cli.scene_options import change
 from mitsuba_diffraction.scene.frames import Frame, write_film
-from mitsuba_diffraction.scene.parameters import values_of_frames
+from mitsuba_diffraction.scene.parameters import change_of, values_of_frames
 
 # A uniform sky alone: every pixel is as bright as `light` says.
 SCENE = """<scene version="3.5.0">
@@ -70,9 +69,9 @@ def test_a_turn_begins_at_the_scenes_value_and_ends_a_step_before(scene):
 
 
 def test_lists_change_number_by_number(scene):
-    frames = values_of_frames(scene, {}, 3, [change("place=0,-9,3:4,-9,2")], [])
+    frames = values_of_frames(scene, {}, 3, [change_of("place=0,-9,3:4,-9,2")], [])
     assert [frame["place"] for frame in frames] == ["0, -9, 3", "2, -9, 2.5", "4, -9, 2"]
-    assert values_of_frames(scene, {}, 1, [change("a=1e-3:2")], []) == [{"a": "0.001"}]
+    assert values_of_frames(scene, {}, 1, [change_of("a=1e-3:2")], []) == [{"a": "0.001"}]
 
 
 def test_frames_that_are_there_are_kept(render):
