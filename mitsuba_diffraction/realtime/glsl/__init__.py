@@ -7,11 +7,10 @@ export_shader  write the shader of a surface for other programs (in `export`)
 scene          scenes as triangles with tangents, materials, lights and a camera
 packed_scene   all that shaders read of a scene, for the renderer and the page
 shader_materials  BSDFs, and the gloss of plain ones
-modelled       surfaces of `diffraction`: constants, energy conservation, tables
-solved         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
+diffracting    surfaces that diffract: constants, energy conservation, tables, lobes
+solved         tables of solved orders: efficiencies as a texture, brightness of lobes
 lobes          directions drawn from lobes, and their densities
 maps           textures of materials
-lanes          values of textures and emitters for many samples and wavelengths
 lights         directions, points, spots, and a smooth sky
 emitters       all emitters of a scene as a sequence of lights
 shadows        shadow maps, and the triangles that cast shadows

@@ -15,7 +15,7 @@ from ...errors import DiffractionError
 from ...plugin.description import Mix, Surface
 from ...plugin.parameter_changes import children
 from ...scene.elements import attribute_of
-from .lanes import evaluated, uploaded
+from ...shading.spectra import evaluated, uploaded
 from .packing import colour_weights
 
 #: Wavelengths (n,) in nm, and values (n,).

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import functools
 import re
 import time
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,14 +21,13 @@ from .context import (
     VertexBuffer,
     check_version,
     compile_program,
-    enable_sides,
     headless_context,
     set_uniforms,
 )
 from .lights import Lamp
 from .packed_scene import PackedScene
 from .packing import pack_responses
-from .progressive import ProgressiveLight, Stage
+from .progressive import ProgressiveLight
 from .shadows import SIZE
 from .source import LIGHTS, fragment_parts
 from .texels import Packed, Uniform
@@ -73,9 +72,6 @@ class Renderer(Resources):
         self._tables: dict[str, list[Bindings]] = {}
         self._programs: dict[object, Any] = {}
         self._arrays: dict[object, Any] = {}
-        self._responses: Bindings | None = None
-        self._stage: Stage | None = None  # emitters and surroundings, built at their first use
-        self._spectra: list[NDArray[np.float64]] = []
 
     def _warn(self, omissions: Sequence[str]) -> None:
         """Warn of unsupported parts of the scene."""
@@ -145,10 +141,9 @@ class Renderer(Resources):
         uniforms: dict[str, Uniform] = {
             "sky": np.asarray(self.sky, np.float32), "surroundings_lit": (1.0, 1.0),
         }  # fmt: skip
-        bindings = Bindings(self.context, Packed((), uniforms, definitions))
-        frame.use()
-        frame.clear(0.0, 0.0, 0.0, 0.0)
-        self.draw_lights(method, frame, camera or self.camera, self.lights, bindings)
+        frame.clear()
+        packed = Packed((), uniforms, definitions)
+        self.draw_lights(method, frame, camera or self.camera, self.lights, packed)
 
     def progressive(
         self,
@@ -175,35 +170,23 @@ class Renderer(Resources):
             `lights`.
         """
         camera = camera or self.camera
-        resized = camera.resized(*(size or camera.size))
-        self._stage = self._stage or self.own(Stage(self.context, self.packed, self.buffers))
-        draw = functools.partial(self.draw_lights, method)
         return ProgressiveLight(
-            self._stage, draw, resized, lights=lights, shadow_size=shadow_size, bounces=bounces
+            self, method, camera.resized(*(size or camera.size)), lights, shadow_size, bounces
         )
 
     def draw_lights(
-        self,
-        method: str,
-        frame: Any,
-        camera: Camera,
-        lights: Sequence[Lamp],
-        bindings: Bindings,
-        extras: Sequence[Sequence[Bindings]] = (),
-        windings: Sequence[int] = (),
-    ) -> None:
+        self, method: str, frame: Any, camera: Camera, lights: Sequence[Lamp], packed: Packed,
+        shared: Sequence[Bindings] = (),
+    ) -> None:  # fmt: skip
         """Draw some lights, or looked-up surroundings, into a framebuffer.
 
         Parameters
         ----------
         method, frame, camera : as in `draw`.
         lights : lights without extent.
-        bindings : of the light; they get the uniforms of the camera and of the lights.
-        extras : further bindings of each surface.
-        windings : of each surface whose triangles that face away are hidden; 0 for others.
+        packed : further uniforms and definitions of the light.
+        shared : further parts of all surfaces.
         """
-        tables = self.tables(method)
-        frame.use()
         matrix = camera.view_projection(self.scene.low, self.scene.high)
         places = np.zeros((LIGHTS, 4), np.float32)
         colours = np.zeros((LIGHTS, 3), np.float32)
@@ -212,29 +195,28 @@ class Renderer(Resources):
             if place[3] == 0.0:
                 place[:3] /= np.linalg.norm(place[:3])
             places[n], colours[n] = place, light.colour
-        bindings.uniforms |= {
+        uniforms: dict[str, Uniform] = {
             "view_projection": tuple(matrix.T.ravel().tolist()),
             "eye": tuple(camera.eye.tolist()),
             "light_place": places,
             "light_colour": colours,
         }
+        responses = pack_responses([(light.wavelengths, light.spectrum) for light in lights])
+        of_light = Bindings(self.context, packed | Packed((), uniforms) | responses)
+        parts_of = [self.bindings, self.tables(method)]
+        if {"WEIGHTED", "LOOKED_UP"} & set(packed.definitions):
+            parts_of.append(self.lobes)
+        frame.use()
+        self.context.enable_only(self.context.DEPTH_TEST)
         for n, surface in enumerate(self.scene.surfaces):
-            parts = (bindings, self.bindings[n], tables[n], *(extras[n] if extras else ()))
-            program = self.program(method, parts)
-            self.bind(program, parts, lights)
+            program = self.bound(method, (of_light, *shared, *(parts[n] for parts in parts_of)))
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
-            enable_sides(self.context, windings[n] if windings else 0)
             if (n, id(program)) not in self._arrays:
                 self._arrays[n, id(program)] = self.own(self.buffers[n].array(program))
             self._arrays[n, id(program)].render()
-
-    def release(self) -> None:
-        """Free the graphics card's memory."""
-        if self._responses is not None:
-            self._responses.release()
-        super().release()
+        of_light.release()
 
     def tables(self, method: str) -> list[Bindings]:
         """Return a method's table of each surface, uploaded at the first call; empty without one.
@@ -242,14 +224,31 @@ class Renderer(Resources):
         Raises a DiffractionError if the method is unknown, or does not support a table.
         """
         if method not in self._tables:
-            tables = (*self.packed.tables(method), Packed())
-            bound = [self.own(Bindings(self.context, packed)) for packed in tables]
-            numbers = (-1 if s.table is None else s.table for s in self.packed.surfaces)
-            self._tables[method] = [bound[number] for number in numbers]
+            self._tables[method] = self._by_surface(self.packed.tables(method))
         return self._tables[method]
 
-    def program(self, method: str, parts: Sequence[Bindings]) -> Any:
-        """Return the program of a surface, which is cached.
+    @cached_property
+    def lobes(self) -> list[Bindings]:
+        """Directions drawn from the lobes of each surface; empty of one without a table."""
+        return self._by_surface(self.packed.lobes)
+
+    def _by_surface(self, of_tables: Sequence[Packed]) -> list[Bindings]:
+        """Upload a part of each table, and return the part of each surface's table."""
+        bound = [self.own(Bindings(self.context, packed)) for packed in (*of_tables, Packed())]
+        return [bound[-1 if s.table is None else s.table] for s in self.packed.surfaces]
+
+    @cached_property
+    def around(self) -> Bindings:
+        """All that lobes look up of direct light (`PackedScene.around`)."""
+        return self.own(Bindings(self.context, self.packed.around))
+
+    @cached_property
+    def bounces(self) -> Bindings:
+        """Light between surfaces."""
+        return self.own(Bindings(self.context, self.packed.bounces))
+
+    def bound(self, method: str, parts: Sequence[Bindings]) -> Any:
+        """Return the program of a surface, which is cached, with its parts bound.
 
         parts : of the light, the surface, its table and its surroundings.
 
@@ -263,27 +262,10 @@ class Renderer(Resources):
             stage = fragment_parts(method, definitions)
             program = compile_program(self.context, f"method {method}", stage)
             self._programs[key] = self.own(program)
-        return self._programs[key]
-
-    def bind(self, program: Any, parts: Sequence[Bindings], lights: Sequence[Lamp]) -> None:
-        """Bind the parts of a surface in its program, and the lights' spectra.
-
-        The spectra are uploaded if the lights have changed.
-        """
         unit = 0
         for part in parts:
-            unit = part.use(program, unit)
-        if "responses" not in program:
-            return
-        pairs = [(light.wavelengths, light.spectrum) for light in lights]
-        spectra = [spectrum for _, spectrum in pairs]
-        same = list(map(id, spectra)) == list(map(id, self._spectra))
-        if self._responses is None or not same:
-            if self._responses is not None:
-                self._responses.release()
-            self._responses = Bindings(self.context, pack_responses(pairs))
-            self._spectra = spectra
-        self._responses.use(program, unit)
+            unit = part.use(self._programs[key], unit)
+        return self._programs[key]
 
     def target(self, width: int, height: int) -> Target:
         """Return a new framebuffer, which the caller releases."""

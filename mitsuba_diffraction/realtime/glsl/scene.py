@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...errors import DiffractionError
+from ...plugin.description import Surface
 from ...scene.elements import check_attributes, name_of
 from ...scene.meshes import has_texcoords, mesh_arrays
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
+from ...shading.spectra import uploaded
 from .camera import Camera, read_camera
-from .lanes import uploaded
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
-from .shader_materials import Diffracting, ShaderMaterial, diffracts, read_materials
+from .shader_materials import ShaderMaterial, diffracts, read_materials
 from .source import LIGHTS
 
 _RINGS, _SEGMENTS = 192, 384  # triangles of a sphere lie within 3e-5 of its radius
@@ -180,7 +181,7 @@ class SceneSurface:
     def table(self) -> Any:
         """Table of heights or of solved orders; None where nothing diffracts."""
         diffraction = self.material.diffraction
-        return None if diffraction is None else diffraction.described.table
+        return None if diffraction is None else diffraction.table
 
 
 @dataclass(frozen=True)
@@ -196,8 +197,8 @@ class RealtimeScene:
     of_light: tuple[str, ...] = ()  # omissions that progressive light does support
 
     @property
-    def diffracting(self) -> tuple[Diffracting, ...]:
-        """Materials that diffract, of all surfaces."""
+    def diffracting(self) -> tuple[Surface, ...]:
+        """Descriptions of all surfaces that diffract."""
         all_surfaces = (surface.material.diffraction for surface in self.surfaces)
         return tuple(surface for surface in all_surfaces if surface is not None)
 

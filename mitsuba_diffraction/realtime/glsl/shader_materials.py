@@ -13,11 +13,10 @@ from ...arrays import Real
 from ...errors import DiffractionError
 from ...plugin.description import Consumer, Feature, Mix, Surface, describe
 from ...plugin.parameter_changes import children
-from .lanes import Lanes
+from ...shading.spectra import spectra_of
+from .diffracting import index_spectra, pack_conservation, pack_constants
 from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_picture
-from .modelled import Modelled, index_spectra
 from .packing import pack_conductor
-from .solved import SolvedSurface
 from .texels import Packed, Texture, Uniform, as_half, four_channels
 
 _COSINES = 64  # nodes of transmittances
@@ -125,32 +124,23 @@ def _principled(bsdf: Any) -> Packed:
 
 def _through(bsdf: Any) -> NDArray[np.float64]:
     """Return the transmittance of the face from Mitsuba's values of the diffuse part."""
+    import drjit as dr
     import mitsuba as mi
 
     cosines = np.maximum(np.linspace(0.0, 1.0, _COSINES), 1e-3)
     context = mi.BSDFContext()
     context.type_mask = mi.BSDFFlags.Diffuse
-    lanes = Lanes(_COSINES, np.full(4, 550.0))
-    si = lanes.interaction()
-    si.uv = mi.Point2f(0.5, 0.5)
     sines = np.sqrt(1.0 - cosines**2)
-    si.wi = mi.Vector3f(mi.Float(sines), 0.0, mi.Float(cosines))
-    reflected = bsdf.eval(context, si, mi.Vector3f(0.0, 0.0, 1.0))
-    pigment = children(bsdf)["diffuse_reflectance"].eval(si)
-    value = lanes.spectra(mi.unpolarized_spectrum(reflected))[:, 0].astype(float)
-    base = lanes.spectra(pigment)[:, 0].astype(float)
-    twice = np.divide(np.pi * value, base, out=np.zeros(_COSINES), where=base > 0.0)
+
+    def twice_passed(si: Any) -> Any:
+        si.uv = mi.Point2f(0.5, 0.5)
+        si.wi = mi.Vector3f(mi.Float(sines), 0.0, mi.Float(cosines))
+        reflected = bsdf.eval(context, si, mi.Vector3f(0.0, 0.0, 1.0))
+        base = children(bsdf)["diffuse_reflectance"].eval(si)
+        return dr.select(base > 0.0, np.pi * mi.unpolarized_spectrum(reflected) / base, 0.0)
+
+    twice = spectra_of(twice_passed, np.full(4, 550.0), _COSINES)[:, 0].astype(float)
     return np.asarray(twice / np.sqrt(max(float(twice[-1]), 1e-12)))
-
-
-#: Table of a surface, packed for shaders.
-Diffracting = Modelled | SolvedSurface
-
-
-def packed_by(described: Surface) -> Diffracting:
-    """Return what packs the table of a surface."""
-    orders = described.orders
-    return Modelled(described) if orders is None else SolvedSurface(described, orders)
 
 
 @dataclass(frozen=True)
@@ -158,7 +148,7 @@ class ShaderMaterial:
     """Material of one shape."""
 
     pigment: Map  # diffuse reflectance, linear sRGB
-    diffraction: Diffracting | None = None
+    diffraction: Surface | None = None  # None where nothing diffracts
     two_sided: bool = False  # whether the back reflects like the front
     # (cos, sin) from the tangent to the patch's x axis, and the factor by which it is stretched
     axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0, 1.0])))
@@ -222,7 +212,7 @@ def read_materials(
         pigment = Map(np.zeros(3))
         if (nested := described.nested) is not None:
             pigment = _diffuse(nested, omissions, f"the base beneath {name}", light)
-        material = ShaderMaterial(pigment, packed_by(described), axis=axis_map(described))
+        material = ShaderMaterial(pigment, described, axis=axis_map(described))
     elif (gloss := Gloss.read(bsdf)) is not None:
         omissions += [f"{part} of {name}" for part in gloss.omissions]
         pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
@@ -232,8 +222,11 @@ def read_materials(
     return [replace(material, two_sided=two_sided, bumps=bumps, normals=normals)]
 
 
-def pack_surface(material: ShaderMaterial) -> Packed:
-    """Pack a material without its tables and energy conservation."""
+def pack_surface(material: ShaderMaterial, factors: Sequence[float] = (1.0,)) -> Packed:
+    """Pack a material without its tables.
+
+    factors : on the height scale, with a page of energy conservation each.
+    """
     uniforms: dict[str, Uniform] = {"two_sided": material.two_sided}
     definitions: dict[str, str] = {}
     textures = []
@@ -254,20 +247,14 @@ def pack_surface(material: ShaderMaterial) -> Packed:
     if diffraction is None:
         pigmented = gloss is None or gloss.pigment is not None
     else:
-        pigmented = diffraction.described.nested is not None
+        pigmented = diffraction.nested is not None
     if pigmented:
         definitions["PIGMENTED"] = ""
     if gloss is not None:
         return packed | gloss.packed()
-    return packed if diffraction is None else packed | diffraction.surface()
-
-
-def pack_conservation(material: ShaderMaterial, factors: Sequence[float] = (1.0,)) -> Packed:
-    """Pack energy conservation and the base's light, at the height scale times each factor."""
-    if material.diffraction is None:
-        return Packed()
-    height_scale = material.diffraction.described.height_scale.number
-    return material.diffraction.conservation([height_scale * factor for factor in factors])
+    if diffraction is None:
+        return packed
+    return packed | pack_constants(diffraction) | pack_conservation(diffraction, factors)
 
 
 def pack_emission(radiance: Real | None) -> Packed:

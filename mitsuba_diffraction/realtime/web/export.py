@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
+from ...plugin.description import Surface
 from ...progress import Progress, showing, silent, tracked
 from ..glsl.methods import WEB_METHODS, check_methods, refusal
 from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
 from ..glsl.scene import RealtimeScene
-from ..glsl.shader_materials import Diffracting
-from ..glsl.source import display_definitions, fragment_parts, web_source
+from ..glsl.source import display_definitions, fragment_parts, joined, web_source
 from .light import packed_light, packed_surroundings
 from .material_choices import INDEXED, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
@@ -225,7 +225,7 @@ class _Writer:
         left_out = {
             method: refusals[0]
             for method in methods
-            if (refusals := [r for s in diffracting if (r := refusal(method, s.described))])
+            if (refusals := [r for s in diffracting if (r := refusal(method, s))])
         }
         shown = [method for method in methods if method not in left_out]
         while shown:
@@ -247,9 +247,9 @@ class _Writer:
             "coherence_width, or a shallower surface"
         )
 
-    def _rounded(self, method: str, surface: Diffracting, digits: int) -> _Table:
+    def _rounded(self, method: str, described: Surface, digits: int) -> _Table:
         """Round a table, and store it."""
-        packed, loss = web_table(method, surface, digits)
+        packed, loss = web_table(method, described, digits)
         return _Table(packed_parts(packed, self._sections), packed.definitions, loss)
 
     def _tables(self, fitted: Mapping[str, list[_Table]]) -> dict[str, Any]:
@@ -258,7 +258,7 @@ class _Writer:
         return {
             "tables": {method: [t.parts for t in tables] for method, tables in fitted.items()},
             "loss": {method: tuple(map(max, pairs)) for method, pairs in losses.items()},
-            "orders": [strongest_orders(table.described) for table in self._packed.diffracting],
+            "orders": [strongest_orders(described) for described in self._packed.diffracting],
         }
 
     def _shaded(self, fitted: Mapping[str, list[_Table]]) -> dict[str, Any]:
@@ -284,8 +284,7 @@ class _Writer:
         `named` are its programs with one of the header's materials, empty where it cannot change.
         """
         coat = _coat(surface)
-        diffraction = surface.scene.material.diffraction
-        described = None if diffraction is None else diffraction.described
+        described = surface.scene.material.diffraction
         named = {} if coat is None else {m: {**d, **INDEXED} for m, d in definitions.items()}
         return {
             "name": surface.scene.name,
@@ -305,7 +304,7 @@ class _Writer:
         The page replaces LIGHTS_LIT by its light's definitions and appends one of `mains`.
         """
         live = {**definitions, **self._around_definitions, "SHADOWED": "", "LIVE": ""}
-        source = _source(method, live)
+        source = joined(fragment_parts(method, live, "web")[:-1])
         if source not in self._sources:
             self._sources.append(source)
         return self._sources.index(source)
@@ -316,10 +315,8 @@ def _coat(surface: PackedSurface) -> float | None:
 
     The materials of solved orders and of mirrors cannot.
     """
-    diffraction = surface.scene.material.diffraction
-    if diffraction is None or diffraction.described.index is None:
-        return None
-    return diffraction.described.coat or 1.0
+    described = surface.scene.material.diffraction
+    return None if described is None or described.index is None else described.coat or 1.0
 
 
 def _shaders(view: str) -> dict[str, Any]:
@@ -349,15 +346,6 @@ def _framed(scene: RealtimeScene) -> dict[str, Any]:
         "subject": [x.tolist() for x in scene.subject],
         "background": _zenith(scene.lighting.sky),
     }
-
-
-def _source(method: str, definitions: dict[str, str]) -> str:
-    """Return a source without its main function; code of surroundings is conditional."""
-    parts = dict(fragment_parts(method, definitions, "web")[:-1])
-    with_surroundings = fragment_parts(method, {**definitions, "LOOKED_UP": ""}, "web")[:-1]
-    further = "".join(text for name, text in with_surroundings if name not in parts)
-    conditional = f"#if defined(WEIGHTED) || defined(LOOKED_UP)\n{further}#endif\n"
-    return "".join((*parts.values(), conditional))
 
 
 def _omissions(packed: PackedScene) -> list[str]:
