@@ -41,85 +41,53 @@ GLSL = Consumer(
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Gloss:
-    """Specular reflection of a BSDF that does not diffract."""
+def pack_gloss(bsdf: Any) -> Packed | None:
+    """Pack the specular reflection of a BSDF that does not diffract, for shaders/gloss.glsl.
 
-    bsdf: Any  # BSDF of Mitsuba
-    alpha: float  # roughness; 0 of a smooth face
-    ggx: bool  # distribution of facets: GGX, or else Beckmann
-    # (n,) transmittance at cosines even from 0 to 1, None of a metal and the principled BSDF. The
-    # base has the BRDF ρ/π times the transmittances of both directions.
-    through: NDArray[np.float64] | None
-    omissions: tuple[str, ...] = ()  # unsupported features, in a few words each
+    None for an unsupported kind. A metal and the principled BSDF have no transmittances `through`;
+    else the base has the BRDF ρ/π times those of both directions, over cosines even from 0 to 1.
+    """
+    import mitsuba as mi
 
-    @classmethod
-    def read(cls, bsdf: Any) -> Gloss | None:
-        """Read the gloss of a BSDF, or return None for an unsupported kind."""
-        import mitsuba as mi
+    kind, parameters = bsdf.class_name(), mi.traverse(bsdf)
+    if kind not in _KINDS:
+        return None
 
-        if bsdf.class_name() not in _KINDS:
-            return None
-        if bsdf.class_name() == "Principled":
-            left_out = (name.replace("_", " ") for name in _LEFT_OUT if _mean(bsdf, name) > 0.0)
-            alpha = max(_mean(bsdf, "roughness") ** 2, 1e-3)  # Mitsuba's formula
-            return cls(bsdf, alpha, True, None, tuple(f"the {part}" for part in left_out))
-        parameters = mi.traverse(bsdf)
-        alpha = next((parameters[n] for n in ("alpha", "alpha.value") if n in parameters), 0.0)
-        if bsdf.class_name().startswith("Rough") and not np.any(alpha):
-            return None  # anisotropic, or a texture
-        metal = bsdf.class_name().endswith("Conductor")
-        through = None if metal else _through(bsdf)
-        rough = float(np.array(alpha).ravel()[0])
-        return cls(bsdf, rough, "distribution = ggx" in str(bsdf), through)
+    def number(name: str) -> float:
+        return float(np.array(parameters[name]).ravel()[0])
 
-    @property
-    def pigment(self) -> Any:
-        """Texture of the diffuse base, None of a metal."""
-        textures = children(self.bsdf)
-        return textures.get("diffuse_reflectance", textures.get("base_color"))
-
-    def packed(self) -> Packed:
-        """Pack the gloss for shaders/gloss.glsl."""
-        import mitsuba as mi
-
-        definitions = {"GLOSS": ""} | ({"GGX": ""} if self.ggx else {})
-        if self.alpha == 0.0:
-            definitions["MIRROR"] = ""
-        packed = Packed((), {"gloss_alpha": self.alpha}, definitions)
-        if self.bsdf.class_name() == "Principled":
-            return packed | _principled(self.bsdf)
-        parts = children(self.bsdf)
-        if self.through is None:
-            return packed | pack_conductor(*index_spectra(parts["eta"], parts["k"]))
-        eta = float(np.array(mi.traverse(self.bsdf)["eta"]).ravel()[0])
-        rows = np.repeat(self.through.reshape(1, -1, 1), 4, axis=2).astype(np.float32)
-        face = Packed(
-            (Texture("through", rows),), {"eta": eta}, {"SURFACE_KIND": "1", "THROUGH": ""}
-        )
-        return packed | face
+    if kind == "Principled":
+        roughness = _mean(bsdf, "roughness")
+        # Mitsuba's formulas
+        alpha = max(roughness**2, 1e-3)
+        if "eta" not in parameters:
+            eta = 2.0 / (1.0 - np.sqrt(0.08 * number("specular"))) - 1.0
+        else:
+            eta = number("eta")
+        uniforms: dict[str, Uniform] = {
+            "gloss_alpha": alpha, "eta": eta, "metallic": _mean(bsdf, "metallic"),
+            "roughness": roughness,
+        }  # fmt: skip
+        definitions = dict.fromkeys(("GLOSS", "GGX", "PIGMENTED", "PRINCIPLED"), "")
+        return Packed((), uniforms, definitions | {"SURFACE_KIND": "1"})
+    alphas = next((parameters[n] for n in ("alpha", "alpha.value") if n in parameters), 0.0)
+    if kind.startswith("Rough") and not np.any(alphas):
+        return None  # anisotropic, or a texture
+    alpha = float(np.array(alphas).ravel()[0])
+    marks = {"GGX": "distribution = ggx" in str(bsdf), "MIRROR": alpha == 0.0, "GLOSS": True}
+    definitions = {name: "" for name, has in marks.items() if has}
+    packed = Packed((), {"gloss_alpha": alpha}, definitions)
+    if kind.endswith("Conductor"):
+        parts = children(bsdf)
+        return packed | pack_conductor(*index_spectra(parts["eta"], parts["k"]))
+    rows = np.repeat(_through(bsdf).reshape(1, -1, 1), 4, axis=2).astype(np.float32)
+    face = {"SURFACE_KIND": "1", "THROUGH": "", "PIGMENTED": ""}
+    return packed | Packed((Texture("through", rows),), {"eta": number("eta")}, face)
 
 
 def _mean(bsdf: Any, name: str) -> float:
     """Return the mean of a BSDF's texture."""
     return float(np.array(children(bsdf)[name].mean()).ravel()[0])
-
-
-def _principled(bsdf: Any) -> Packed:
-    """Pack index, metallic and roughness of the principled BSDF."""
-    import mitsuba as mi
-
-    parameters = mi.traverse(bsdf)
-    if "eta" in parameters:
-        eta = float(np.array(parameters["eta"]).ravel()[0])
-    else:
-        specular = float(np.array(parameters["specular"]).ravel()[0])
-        eta = 2.0 / (1.0 - np.sqrt(0.08 * specular)) - 1.0  # Mitsuba's formula
-    return Packed(
-        (),
-        {"eta": eta, "metallic": _mean(bsdf, "metallic"), "roughness": _mean(bsdf, "roughness")},
-        {"SURFACE_KIND": "1", "PRINCIPLED": ""},
-    )
 
 
 def _through(bsdf: Any) -> NDArray[np.float64]:
@@ -152,7 +120,7 @@ class ShaderMaterial:
     two_sided: bool = False  # whether the back reflects like the front
     # (cos, sin) from the tangent to the patch's x axis, and the factor by which it is stretched
     axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0, 1.0])))
-    gloss: Gloss | None = None  # specular reflection of a BSDF that does not diffract
+    gloss: Packed | None = None  # specular reflection of a BSDF that does not diffract
     bumps: Map | None = None  # heights (rows, columns, 1) in the scene's unit, or None
     normals: Map | None = None  # (rows, columns, 3) in the shading frame, or None
     mask: Map | None = None  # interval of [0, 1) that the surface takes in a mix, or None
@@ -213,9 +181,12 @@ def read_materials(
         if (nested := described.nested) is not None:
             pigment = _diffuse(nested, omissions, f"the base beneath {name}", light)
         material = ShaderMaterial(pigment, described, axis=axis_map(described))
-    elif (gloss := Gloss.read(bsdf)) is not None:
-        omissions += [f"{part} of {name}" for part in gloss.omissions]
-        pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
+    elif (gloss := pack_gloss(bsdf)) is not None:
+        if bsdf.class_name() == "Principled":
+            left_out = (part for part in _LEFT_OUT if _mean(bsdf, part) > 0.0)
+            omissions += [f"the {part.replace('_', ' ')} of {name}" for part in left_out]
+        texture = _base(bsdf)
+        pigment = Map(np.zeros(3)) if texture is None else colour_map(texture, light)
         material = ShaderMaterial(pigment, gloss=gloss)
     else:
         material = ShaderMaterial(_diffuse(bsdf, omissions, name, light))
@@ -243,18 +214,14 @@ def pack_surface(material: ShaderMaterial, factors: Sequence[float] = (1.0,)) ->
             marks = {"MAPPED": True, "CLAMPED": value.clamped, "NEAREST": value.nearest}
             definitions |= {f"{name.upper()}_{mark}": "true" for mark, on in marks.items() if on}
     packed = Packed(tuple(textures), uniforms, definitions)
-    diffraction, gloss = material.diffraction, material.gloss
-    if diffraction is None:
-        pigmented = gloss is None or gloss.pigment is not None
-    else:
-        pigmented = diffraction.nested is not None
-    if pigmented:
-        definitions["PIGMENTED"] = ""
+    described, gloss = material.diffraction, material.gloss
     if gloss is not None:
-        return packed | gloss.packed()
-    if diffraction is None:
+        return packed | gloss
+    if described is None or described.nested is not None:
+        definitions["PIGMENTED"] = ""
+    if described is None:
         return packed
-    return packed | pack_constants(diffraction) | pack_conservation(diffraction, factors)
+    return packed | pack_constants(described) | pack_conservation(described, factors)
 
 
 def pack_emission(radiance: Real | None) -> Packed:
@@ -280,11 +247,16 @@ def diffracts(bsdf: Any) -> bool:
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:
     """Return the reflectance of a diffuse BSDF; other kinds become their diffuse part, or grey."""
-    textures, kind = children(bsdf), bsdf.class_name()
-    for key in ("diffuse_reflectance", "base_color", "reflectance"):
-        if key in textures:
-            if kind != "SmoothDiffuse":
-                omissions.append(f"the gloss of {name} ({kind})")
-            return colour_map(textures[key], light)
+    kind = bsdf.class_name()
+    if (texture := _base(bsdf)) is not None:
+        if kind != "SmoothDiffuse":
+            omissions.append(f"the gloss of {name} ({kind})")
+        return colour_map(texture, light)
     omissions.append(f"the material of {name} ({kind}, shown as grey)")
     return Map(np.full(3, _OTHER_GREY))
+
+
+def _base(bsdf: Any) -> Any:
+    """Return the texture of a BSDF's diffuse part, or None."""
+    names, textures = ("diffuse_reflectance", "base_color", "reflectance"), children(bsdf)
+    return next((textures[name] for name in names if name in textures), None)
