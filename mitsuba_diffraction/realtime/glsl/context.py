@@ -121,6 +121,15 @@ class VertexBuffer(Resources):
         return self._context.vertex_array(program, attributes, index_buffer=self._corners)
 
 
+def enable_sides(context: Any, winding: int) -> None:
+    """Draw with a depth test, and of closed surfaces only triangles that face the camera.
+
+    winding : as of `scene.winding_of`; 0 draws all triangles.
+    """
+    context.cull_face = "back" if winding > 0 else "front"
+    context.enable_only(context.DEPTH_TEST | (context.CULL_FACE if winding else context.NOTHING))
+
+
 def compiler_words(log: str, parts: Sequence[tuple[str, str]]) -> str:
     """Shorten a compiler's log to one line: file, line and message of the first error.
 

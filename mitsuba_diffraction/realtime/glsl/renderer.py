@@ -21,6 +21,7 @@ from .context import (
     VertexBuffer,
     check_version,
     compile_program,
+    enable_sides,
     headless_context,
     set_uniforms,
 )
@@ -207,7 +208,6 @@ class Renderer(Resources):
         if {"WEIGHTED", "LOOKED_UP"} & set(packed.definitions):
             parts_of.append(self.lobes)
         frame.use()
-        self.context.enable_only(self.context.DEPTH_TEST)
         for n, surface in enumerate(self.scene.surfaces):
             program = self.bound(method, (of_light, *shared, *(parts[n] for parts in parts_of)))
             if "pigment_in_light" in program:
@@ -215,6 +215,7 @@ class Renderer(Resources):
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
             if (n, id(program)) not in self._arrays:
                 self._arrays[n, id(program)] = self.own(self.buffers[n].array(program))
+            enable_sides(self.context, surface.hides_itself_from(np.append(camera.eye, 1.0)))
             self._arrays[n, id(program)].render()
         of_light.release()
 

@@ -14,7 +14,15 @@ import numpy as np
 
 from ...arrays import Real
 from .camera import Camera, box_corners
-from .context import Bindings, Resources, Target, VertexBuffer, compile_program, set_uniforms
+from .context import (
+    Bindings,
+    Resources,
+    Target,
+    VertexBuffer,
+    compile_program,
+    enable_sides,
+    set_uniforms,
+)
 from .lights import Lamp
 from .scene import RealtimeScene, SceneSurface
 from .source import source_parts
@@ -42,6 +50,7 @@ class ShadowMap(Resources):
         size: int = SIZE,
     ) -> None:  # fmt: skip
         self._context, self._scene, self._size = context, scene, size
+        self._camera = np.append(camera.eye, 1.0)
         parts = source_parts(["position.frag"])
         self._program = self.own(compile_program(context, "shadow maps", parts))
         self._arrays = [self.own(buffer.array(self._program)) for buffer in buffers]
@@ -57,20 +66,23 @@ class ShadowMap(Resources):
         scale = _GLANCES / max(camera.size)
         target = Target(self._context, *(max(1, round(scale * n)) for n in camera.size))
         matrix = camera.view_projection(self._scene.low, self._scene.high)
-        self._draw(target.frame, matrix, lambda surface: not surface.lamp)
+        self._draw(target.frame, matrix, lambda one: None if one.lamp else 0)
         pixels = target.read().reshape(-1, 4).astype(float)
         target.release()
         places = pixels[pixels[:, 3] > 0.0, :3]
         return places if len(places) else self._corners
 
-    def _draw(self, frame: Any, matrix: Real, drawn: Callable[[SceneSurface], bool]) -> None:
-        """Draw some surfaces with a matrix (4, 4) from the scene to clip space."""
+    def _draw(self, frame: Any, matrix: Real, sides: Callable[[SceneSurface], int | None]) -> None:
+        """Draw with a matrix (4, 4) from the scene to clip space.
+
+        sides : of each surface, as of `enable_sides`, or None to leave it out.
+        """
         frame.use()
         frame.clear()
-        self._context.enable_only(self._context.DEPTH_TEST)
         set_uniforms(self._program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         for surface, array in zip(self._scene.surfaces, self._arrays, strict=True):
-            if drawn(surface):
+            if (winding := sides(surface)) is not None:
+                enable_sides(self._context, winding)
                 array.render()
 
     def draw(self, light: Lamp, shift: Real) -> Bindings:
@@ -82,10 +94,15 @@ class ShadowMap(Resources):
         """
         view = self._perspective if light.place[3] else self._parallel
         matrix, scale = view(light.place[:3], shift)
-        self._draw(
-            self._frame, matrix,
-            lambda one: one.shape.ptr != light.shape and not (one.lamp and light.place[3]),
-        )  # fmt: skip
+
+        def sides(one: SceneSurface) -> int | None:
+            if one.shape.ptr == light.shape or (one.lamp and light.place[3]):
+                return None
+            # the map looks along its z axis, which reverses the triangles' orientation: triangles
+            # that face away from the light hide all that the others hide
+            return one.hides_itself_from(self._camera) and one.hides_itself_from(light.place)
+
+        self._draw(self._frame, matrix, sides)
         cone = (0.0, 0.0)
         if light.cone is not None:
             cone = light.cone[0], 1.0 / max(light.cone[0] - light.cone[1], 1e-6)

@@ -8,7 +8,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, bsdf_dict, gratings
 from mitsuba_diffraction.realtime.glsl.packed_scene import PackedScene
-from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of
+from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of, winding_of
 from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
 
 
@@ -34,6 +34,17 @@ def test_normals_are_mitsubas(some_variant: str, kind: str, flipped: bool) -> No
     assert len(mean) > 0
     assert np.array(found.is_valid()).all()
     assert np.abs(mean - expected).max() < 0.02
+
+
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_closed_surfaces_are_told_from_open_ones(some_variant: str, mirrored: float) -> None:
+    to_world = mi.ScalarTransform4f().scale([mirrored, 1.0, 1.0])
+    for kind, closed in (("sphere", True), ("cube", True), ("cylinder", False), ("disk", False)):
+        shape = mi.load_dict({"type": kind, "to_world": to_world})
+        triangles = triangles_of(shape).positions.reshape(-1, 3, 3)
+        a, b, c = triangles[1]
+        turn = np.sign(np.cross(b - a, c - a) @ (a + b + c))  # as seen from outside a convex body
+        assert winding_of(triangles) == (turn if closed else 0), kind
 
 
 def test_a_ball_and_a_plate_are_as_far_away_as_they_are(some_variant: str) -> None:
