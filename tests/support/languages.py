@@ -26,7 +26,7 @@ void main()
     {body}
     float one = 0.5 * dot(a + b, a + b);
     gl_Position = vec4(heights, 0.0, 1.0);  // keeps them where a model reads none
-    result = one * one * boundary_factor({late}heights.x, heights.y);
+    result = one * one * boundary_factor(a, b, {index}, heights.x, heights.y{outside});
 }}
 """
 
@@ -38,16 +38,12 @@ def shaded(gl: Any, given: Pairs, model: Model, index: complex, coated: bool) ->
     relative = index / n
     text = f"{relative.real:.9g}" if real else f"vec2({relative.real:.9g}, {relative.imag:.9g})"
     definitions = {"BOUNDARY": model.name, "SURFACE_KIND": "1" if real else "2"}
-    early = "a, b" + (f", {text}" if real else "")
     body = "vec3 a = wi, b = wo;\n"
     if coated:
         definitions["COATED"] = ""
         body = f"vec3 a = refracted(wi, {n}), b = refracted(wo, {n});\n"
-        early += f", {n}, wi.z, wo.z"
-    body += f"    begin_boundary({early});"
-    source = VERTEX.format(
-        functions=formulas(definitions), body=body, late="" if real else f"{text}, "
-    )
+    outside = f", {n}, wi.z, wo.z" if coated else ""
+    source = VERTEX.format(functions=formulas(definitions), body=body, index=text, outside=outside)
     program = gl.program(vertex_shader=source, varyings=["result"])
     heights = np.stack([given.kappa, given.variance], axis=1)
     data = np.concatenate([given.wi, given.wo, heights], axis=1).astype("f4")

@@ -77,9 +77,8 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
         program.add(beneath_reflectance, "float", "float", index)
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
-        program.add_staged(
+        program.add(
             relative_power, model.jones, "vector", "vector", index, "float", "float", coat,
-            late=("kappa", "variance") + (("index",) if index == "complex" else ()),
-            names=("begin_boundary", "boundary_factor"),
+            name="boundary_factor",
         )  # fmt: skip
     return f"{program.text}\n"

@@ -1,5 +1,4 @@
-// Boundary factor of the material, N' / (1 + ωi·ωo)². The formulas are of optics/ (formulas.py):
-// `begin_boundary` prepares what all wavelengths of a pair share, `boundary_factor` has the rest.
+// Boundary factor of the material, N' / (1 + ωi·ωo)². The formulas are of optics/ (formulas.py).
 // Kirchhoff's factor is the reflectance at the half vector.
 
 #ifdef COATED
@@ -50,27 +49,29 @@ float height_statistic(float q) { return 0.0; }
 
 #endif
 
-// Prepare the values of a pair of directions above the structure that all wavelengths share.
-// outer: their cosines outside of a coat.
+vec3 pair_wi, pair_wo;            // above the structure
+vec2 pair_outer;                  // their cosines outside of a coat
+
 void begin_pair(vec3 wi, vec3 wo, vec2 outer)
 {
-#if SURFACE_KIND == DIELECTRIC && defined(COATED)
-    begin_boundary(wi, wo, eta, coat, outer.x, outer.y);
-#elif SURFACE_KIND == DIELECTRIC
-    begin_boundary(wi, wo, eta);
-#elif defined(COATED)
-    begin_boundary(wi, wo, coat, outer.x, outer.y);
-#else
-    begin_boundary(wi, wo);
-#endif
+    pair_wi = wi;
+    pair_wo = wo;
+    pair_outer = outer;
 }
 
-#if SURFACE_KIND == DIELECTRIC
+#ifdef COATED
+#define FACTOR(index, kappa, variance) boundary_factor(pair_wi, pair_wo, index, kappa, variance, \
+                                                       coat, pair_outer.x, pair_outer.y)
+#else
+#define FACTOR(index, kappa, variance) boundary_factor(pair_wi, pair_wo, index, kappa, variance)
+#endif
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    return boundary_factor(k * z, height_statistic(k * r));
+    return FACTOR(index_at(k), k * z, height_statistic(k * r));
 }
+
+#if SURFACE_KIND == DIELECTRIC
 
 vec3 boundary(float cos_half, float r, float z)
 {
@@ -81,11 +82,6 @@ vec3 boundary(float cos_half, float r, float z)
 
 #else
 
-float boundary_at(float cos_half, float k, float r, float z)
-{
-    return boundary_factor(index_at(k), k * z, height_statistic(k * r));
-}
-
 // Boundary factor of each channel: the reflectance under daylight, times the ratio of the model's to
 // Kirchhoff's factor at the channel's mean wavelength.
 vec3 boundary(float cos_half, float r, float z)
@@ -94,7 +90,7 @@ vec3 boundary(float cos_half, float r, float z)
     for (int n = 0; n < 3; ++n) {
         float k = channel_wavenumbers[n];
         vec2 index = vec2(channel_eta[n], channel_k[n]);
-        found[n] = boundary_factor(index, k * z, height_statistic(k * r))
+        found[n] = FACTOR(index, k * z, height_statistic(k * r))
                    / max(interface_reflectance(cos_half, index), 1e-20);
     }
     return found * reflectance(cos_half);
