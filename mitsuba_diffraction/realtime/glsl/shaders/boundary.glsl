@@ -71,17 +71,6 @@ float boundary_at(float cos_half, float k, float r, float z)
     return FACTOR(index_at(k), k * z, height_statistic(k * r));
 }
 
-#if SURFACE_KIND == DIELECTRIC
-
-vec3 boundary(float cos_half, float r, float z)
-{
-    vec3 found;
-    for (int n = 0; n < 3; ++n) found[n] = boundary_at(cos_half, channel_wavenumbers[n], r, z);
-    return found;
-}
-
-#else
-
 // Boundary factor of each channel: the reflectance under daylight, times the ratio of the model's to
 // Kirchhoff's factor at the channel's mean wavelength.
 vec3 boundary(float cos_half, float r, float z)
@@ -89,12 +78,10 @@ vec3 boundary(float cos_half, float r, float z)
     vec3 found;
     for (int n = 0; n < 3; ++n) {
         float k = channel_wavenumbers[n];
-        vec2 index = vec2(channel_eta[n], channel_k[n]);
-        found[n] = FACTOR(index, k * z, height_statistic(k * r))
-                   / max(interface_reflectance(cos_half, index), 1e-20);
+        found[n] = FACTOR(channel_index(n), k * z, height_statistic(k * r))
+                   / max(interface_reflectance(cos_half, channel_index(n)), 1e-20);
     }
     return found * reflectance(cos_half);
 }
 
-#endif
 #endif
