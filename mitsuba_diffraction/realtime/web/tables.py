@@ -21,7 +21,7 @@ from ...tables.powers import as_powers, powers_at
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.solved import pack_orders
 from ..glsl.texels import Packed, shortened
-from .sections import as_columns, converted
+from .sections import converted
 
 #: Binary digits of a series' largest number, fewer where tables are too large for a page; of the
 #: most, the mean ΔE2000 stays below 0.1.
@@ -74,7 +74,7 @@ def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounde
     width = 4 * (counts.rho + 1)
 
     def fewer(data: NDArray[np.floating]) -> NDArray[np.float16]:
-        return rounded(as_columns(data, width), digits, FLOOR).reshape(data.shape)
+        return rounded(data.reshape(-1, width), digits, FLOOR).reshape(data.shape)
 
     less = converted(packed, {"efficiencies": fewer})
     return less, _solved_loss(table, counts, digits)

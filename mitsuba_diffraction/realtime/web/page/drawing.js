@@ -89,9 +89,8 @@ async function uploadTexture(gl, data, entry) {
       single: { internal: [gl.R32F, gl.RG32F, gl.RGBA32F], type: gl.FLOAT },
     }[entry.kind];
     const format = [gl.RED, gl.RG, gl.RGBA][n];
-    const numbers = content.subarray(0, width * height * channels);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, numbers);
+    gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, content);
   }
   const [filter, wrap] = entry.smooth ? [gl.LINEAR, gl.REPEAT] : [gl.NEAREST, gl.CLAMP_TO_EDGE];
   for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, filter);
