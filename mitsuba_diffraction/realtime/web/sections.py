@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -59,35 +59,27 @@ def _planes(bits: NDArray[Any], differences: bool) -> bytes:
     return bits.view(np.uint8).reshape(len(bits), -1).T.tobytes()
 
 
-class Sections:
+class Sections(list[Section]):
     """Data of the page, a sequence of sections."""
-
-    def __init__(self, parts: Iterable[Section] = ()) -> None:
-        self._parts = list(parts)
-
-    def copy(self) -> Sections:
-        """Return a sequence that begins with these sections."""
-        return Sections(self._parts)
 
     def add(self, section: Section) -> int:
         """Append a section unless it exists, and return its number."""
-        if section in self._parts:
-            return self._parts.index(section)
-        self._parts.append(section)
-        return len(self._parts) - 1
+        if section not in self:
+            self.append(section)
+        return self.index(section)
 
     @property
     def nbytes(self) -> int:
         """Number of bytes so far."""
-        return sum(len(part.data) for part in self._parts)
+        return sum(len(part.data) for part in self)
 
     def joined(self) -> tuple[bytes, list[dict[str, Any]]]:
         """Return all bytes, and position and layout of each section."""
         layouts, start = [], 0
-        for part in self._parts:
+        for part in self:
             layouts.append({**part.layout, "start": start, "length": len(part.data)})
             start += len(part.data)
-        return b"".join(part.data for part in self._parts), layouts
+        return b"".join(part.data for part in self), layouts
 
 
 def packed_mesh(vertices: NDArray[np.float32], sections: Sections) -> dict[str, Any]:
