@@ -22,7 +22,7 @@ LIGHTS = 4
 
 _CONSTANTS = {
     "PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS),
-    "SURFACE_KIND": "0", "LIGHTS_LIT": "1", "TEXELS": "1", "TAPS_X": "1", "TAPS_Y": "1",
+    "SURFACE_KIND": "0", "LIGHTS_LIT": "1", "TEXELS": "1",
     "COLOUR_CLAMPED": "false", "AXIS_CLAMPED": "false", "MASK_CLAMPED": "false",
     "COLOUR_NEAREST": "false", "AXIS_NEAREST": "false", "MASK_NEAREST": "false",
 }  # fmt: skip

@@ -41,7 +41,7 @@ CODE_BYTES = 200_000
 
 _SCRIPTS = (
     "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "shadow.js",
-    "surroundings.js", "viewer.js", "link.js", "map.js", "controls.js", "main.js",
+    "viewer.js", "link.js", "map.js", "controls.js", "main.js",
 )  # fmt: skip
 
 
