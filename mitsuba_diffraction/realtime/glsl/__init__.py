@@ -10,13 +10,13 @@ shader_materials  BSDFs, and the gloss of plain ones
 diffracting    surfaces that diffract: constants, energy conservation, tables, lobes
 solved         tables of solved orders: efficiencies as a texture, brightness of lobes
 lobes          directions drawn from lobes, and their densities
+features       features of surfaces that the shaders draw
 maps           textures of materials
 lights         directions, points, spots, and a smooth sky
 emitters       all emitters of a scene as a sequence of lights
 shadows        shadow maps, and the triangles that cast shadows
 surroundings   environments, flat lights and obstacles, which lobes look up
 bounces        light between surfaces on a grid
-progressive    accumulation of frames, each with one light or with looked-up surroundings
 camera         sensors as cameras
 packing        tables as textures
 texels         textures, uniforms and definitions that a shader reads; packing of numbers
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from .renderer import Renderer
 
 __all__ = [
-    "Renderer", "export", "export_shader", "methods", "packing", "scene", "shader_materials",
+    "Renderer", "export", "export_shader", "features", "methods", "packing", "scene",
     "texels",
 ]  # fmt: skip
 

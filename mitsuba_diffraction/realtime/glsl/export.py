@@ -15,11 +15,12 @@ from ...atomic import atomic_path, make_folder
 from ...plugin.description import Consumer, Feature, Surface
 from ...tables import write_channels
 from .diffracting import pack_table, words_of
+from .features import GLSL
 from .maps import Map
 from .methods import check_methods
 from .packing import pack_responses
 from .rewriting import global_names, renamed, shader_file
-from .shader_materials import GLSL, ShaderMaterial, pack_surface
+from .shader_materials import ShaderMaterial, pack_surface
 from .source import method_files, part, surface_files
 from .texels import PAGE, Packed, Texture, four_channels, plain
 

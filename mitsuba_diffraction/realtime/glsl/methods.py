@@ -33,7 +33,7 @@ class ShaderMethod:
 
 def _exact() -> Consumer:
     from ...plugin.description import Consumer, Feature
-    from .shader_materials import GLSL
+    from .features import GLSL
 
     return Consumer("method exact", GLSL.shows - {Feature.PATCH}, "use method fast")
 

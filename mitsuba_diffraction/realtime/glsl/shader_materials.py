@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...errors import DiffractionError
-from ...plugin.description import Consumer, Feature, Mix, Surface, describe
+from ...plugin.description import Mix, Surface, describe
 from ...plugin.parameter_changes import children
 from ...shading.spectra import spectra_of
 from .diffracting import index_spectra, pack_conservation, pack_constants
+from .features import GLSL
 from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_picture
 from .packing import pack_conductor
 from .texels import Packed, Texture, Uniform, as_half, four_channels
@@ -28,17 +29,6 @@ _LEFT_OUT = ("spec_trans", "anisotropic", "sheen", "flatness", "clearcoat", "spe
 #: Classes of BSDFs that wrap another BSDF; masks are not supported.
 _WRAPPERS = ("TwoSidedBRDF", "BumpMap", "NormalMap", "MaskBSDF")
 _OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
-
-#: Features that the shaders draw.
-GLSL = Consumer(
-    "the realtime renderer",
-    frozenset(Feature) - {
-        Feature.TRANSMISSION, Feature.FILM, Feature.STACK, Feature.PLACED,
-        Feature.VARYING_HEIGHT, Feature.CROSSED, Feature.VARYING_FILM,
-    },
-    "leave it out, or render the scene with Mitsuba",
-    {Feature.CROSSED: "render the scene with Mitsuba"},
-)  # fmt: skip
 
 
 def pack_gloss(bsdf: Any) -> Packed | None:

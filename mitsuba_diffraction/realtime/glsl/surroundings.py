@@ -1,7 +1,7 @@
 """Surroundings of a scene, which shaders look up along directions drawn from a surface's lobes.
 
 Lights that are drawn independently of a surface rarely lie in a narrow lobe. So every other frame
-of `progressive` draws a direction from the surface's lobe at each pixel, and looks up the light
+of progressive light draws a direction from the surface's lobe at each pixel, and looks up the light
 from that direction: flat area lights, and the environment. The balance heuristic (Veach and Guibas
 1995) weights the two kinds of frames.
 

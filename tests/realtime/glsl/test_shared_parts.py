@@ -15,8 +15,9 @@ from mitsuba_diffraction.optics.display import VIEWS, shown
 from mitsuba_diffraction.plugin.description import Surface
 from mitsuba_diffraction.realtime.glsl.diffracting import pack_constants, pack_table
 from mitsuba_diffraction.realtime.glsl.export import make_shader
+from mitsuba_diffraction.realtime.glsl.features import GLSL
 from mitsuba_diffraction.realtime.glsl.maps import axis_map
-from mitsuba_diffraction.realtime.glsl.shader_materials import GLSL, ShaderMaterial, pack_surface
+from mitsuba_diffraction.realtime.glsl.shader_materials import ShaderMaterial, pack_surface
 from mitsuba_diffraction.realtime.glsl.source import display_definitions, joined, source_parts
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed, shaded

@@ -12,7 +12,7 @@ const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\
 // uniforms of a light without shadows
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
 
-// Light of samples that look up the surroundings, and the numbers of each, like glsl/progressive.py.
+// Light of samples that look up the surroundings, and the numbers of each, like glsl/renderer.py.
 const WHITE = { place: [0, 0, 1, 0], colour: [1, 1, 1], axis: DARK, cone: [0, 0], spectrum: -1, density: 0 };
 const drawnNumbers = (n) => [0.5 + Math.sqrt(1.25), Math.sqrt(19)].map((step) => (0.5 + (n + 1) * step) % 1);
 
