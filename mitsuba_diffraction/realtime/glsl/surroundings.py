@@ -27,7 +27,7 @@ from ...scene.elements import name_of
 from .lights import AROUND_SUN, area_of, emitted_radiance, radiance_along, sun_of
 from .scene import sample_normal
 from .shadows import frame_along
-from .texels import Packed, Texture, Uniform, as_half, pack_grid
+from .texels import Packed, Texture, Uniform, as_half, four_channels, pack_grid
 
 # grid of distances
 _CELLS = 1 << 22  # approximate number of cells
@@ -149,11 +149,9 @@ class Environment:
 
         share : probability of lights drawn from the environment.
         """
-        rows, columns, _ = self.picture.shape
-        four = np.concatenate([self.picture, np.zeros((rows, columns, 1), np.float32)], axis=2)
         cosine = np.cos(_SUN_RADIUS) if self.sun.any() else 2.0
         return Packed(
-            (Texture("environment", as_half(four), smooth=True),),
+            (Texture("environment", as_half(four_channels(self.picture)), smooth=True),),
             {
                 "environment_density": share / self.total if self.total > 0.0 else 0.0,
                 "sun": (*self.sun.tolist(), float(cosine)),
