@@ -60,7 +60,7 @@ def patch_formulas(model: Model | None, coated: bool = False) -> str:
     jones = None if model is None else model.jones
     program.add(
         pair_power, jones, "vector", "vector", "complex", "float", "float",
-        Coat("float", "float", "float") if coated else None, name="boundary_factor",
+        Coat("float", "float", "float") if coated else None,
     )  # fmt: skip
     if coated:
         program.add(refracted, "vector", "float")

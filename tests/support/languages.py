@@ -24,9 +24,8 @@ in vec3 wi; in vec3 wo; in vec2 heights; out float result;
 void main()
 {{
     {body}
-    float one = 0.5 * dot(a + b, a + b);
     gl_Position = vec4(heights, 0.0, 1.0);  // keeps them where a model reads none
-    result = one * one * boundary_factor(a, b, {index}, heights.x, heights.y{outside});
+    result = pair_power(a, b, {index}, heights.x, heights.y{outside});
 }}
 """
 
@@ -66,7 +65,7 @@ shader probe(string Incident = "", string Outgoing = "", float Eta = 1.0, float 
     float kappa, variance;
     color wi = texture(Incident, P[0], P[1], "interp", "closest", "alpha", kappa);
     color wo = texture(Outgoing, P[0], P[1], "interp", "closest", "alpha", variance);
-    BSDF = emission() * boundary_factor(vector(wi), vector(wo), md_of(Eta, Kappa), kappa, variance);
+    BSDF = emission() * pair_power(vector(wi), vector(wo), md_of(Eta, Kappa), kappa, variance);
 }
 """
 _CODE = f"""{PLANE}

@@ -29,7 +29,7 @@ from ...optics.orders import (
 )
 from ...shading.dialects import GLSL
 from ...shading.orders import FORMULAS
-from ...shading.pair_power import Coat, relative_power
+from ...shading.pair_power import Coat, pair_power
 from ...shading.programs import Program
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
@@ -78,7 +78,6 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
         program.add(
-            relative_power, model.jones, "vector", "vector", index, "float", "float", coat,
-            name="boundary_factor",
+            pair_power, model.jones, "vector", "vector", index, "float", "float", coat,
         )  # fmt: skip
     return f"{program.text}\n"

@@ -171,10 +171,10 @@ def _picture(
     uv, _ = _centres(textures[sizes.index((width, height))], width, height)
     values = look_up(uv)
     aside = np.linalg.inv(to_uv)[:2, :2] @ np.array([0.3 / width, 0.3 / height])
-    return Map(
-        values[0].astype(float), values.reshape(height, width, -1), to_uv, clamped=_clamps(look_up, to_uv),
-        nearest=bool(np.allclose(look_up(uv + aside), values)),
-    )  # fmt: skip
+    first, clamped = values[0].astype(float), _clamps(look_up, to_uv)
+    nearest = bool(np.allclose(look_up(uv + aside), values))
+    picture = values.reshape(height, width, -1)
+    return Map(first, picture, to_uv, clamped=clamped, nearest=nearest)
 
 
 def _size(texture: Any) -> tuple[int, int]:

@@ -51,24 +51,27 @@ float height_statistic(float q) { return 0.0; }
 
 vec3 pair_wi, pair_wo;            // above the structure
 vec2 pair_outer;                  // their cosines outside of a coat
+float pair_square;                // (1 + ωi·ωo)²
 
 void begin_pair(vec3 wi, vec3 wo, vec2 outer)
 {
     pair_wi = wi;
     pair_wo = wo;
     pair_outer = outer;
+    float edge = max(0.5 * dot(wi + wo, wi + wo), 1e-12);  // not 0 of opposite grazing directions
+    pair_square = edge * edge;
 }
 
 #ifdef COATED
-#define FACTOR(index, kappa, variance) boundary_factor(pair_wi, pair_wo, index, kappa, variance, \
-                                                       coat, pair_outer.x, pair_outer.y)
+#define POWER(index, kappa, variance) pair_power(pair_wi, pair_wo, index, kappa, variance, \
+                                                 coat, pair_outer.x, pair_outer.y)
 #else
-#define FACTOR(index, kappa, variance) boundary_factor(pair_wi, pair_wo, index, kappa, variance)
+#define POWER(index, kappa, variance) pair_power(pair_wi, pair_wo, index, kappa, variance)
 #endif
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    return FACTOR(index_at(k), k * z, height_statistic(k * r));
+    return POWER(index_at(k), k * z, height_statistic(k * r)) / pair_square;
 }
 
 // Boundary factor of each channel: the reflectance under daylight, times the ratio of the model's to
@@ -78,10 +81,10 @@ vec3 boundary(float cos_half, float r, float z)
     vec3 found;
     for (int n = 0; n < 3; ++n) {
         float k = channel_wavenumbers[n];
-        found[n] = FACTOR(channel_index(n), k * z, height_statistic(k * r))
+        found[n] = POWER(channel_index(n), k * z, height_statistic(k * r))
                    / max(interface_reflectance(cos_half, channel_index(n)), 1e-20);
     }
-    return found * reflectance(cos_half);
+    return found * reflectance(cos_half) / pair_square;
 }
 
 #endif
