@@ -31,13 +31,9 @@ _ATOM = 9
 
 @dataclass
 class Program:
-    """Functions in a dialect.
-
-    macros : names that variables must not have.
-    """
+    """Functions in a dialect."""
 
     dialect: Dialect
-    macros: frozenset[str] = frozenset()
     functions: dict[str, str] = field(default_factory=dict)
 
     def add(self, formula: Callable[..., Any], *arguments: Any, name: str = "") -> None:
@@ -58,7 +54,7 @@ class Program:
 
     def _run(self, formula: Callable[..., Any], arguments: Sequence[Any]) -> Any:
         """Run a formula on symbols; return its parameters, and its results by name."""
-        parameters = _Parameters(self.dialect, self.macros, Trace())
+        parameters = _Parameters(self.dialect, Trace())
         names = inspect.signature(formula).parameters
         values = [parameters.add(*pair) for pair in zip(names, arguments, strict=False)]
         result = formula(*values)
@@ -79,8 +75,8 @@ class Program:
 class _Parameters:
     """Parameters of a function that is written, and the text of its expressions."""
 
-    def __init__(self, dialect: Dialect, macros: frozenset[str], trace: Trace) -> None:
-        self.dialect, self.macros, self.trace = dialect, macros, trace
+    def __init__(self, dialect: Dialect, trace: Trace) -> None:
+        self.dialect, self.trace = dialect, trace
         self.kinds: dict[str, str] = {}
         self.known: dict[int, str] = {}
         self._taken: set[str] = set()
@@ -104,7 +100,7 @@ class _Parameters:
     def take(self, name: str) -> str:
         """Return a name for a variable that is new in the function and legal in the language."""
         name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
-        if name in self.macros or name in self.dialect.reserved:
+        if name.isupper() or name in self.dialect.reserved:  # macros of the shaders are upper-case
             name += "_"
         numbered, n = name, 1
         while numbered in self._taken:

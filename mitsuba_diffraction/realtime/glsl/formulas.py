@@ -44,8 +44,6 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "VCAVITY": {vcavity: 3},
     "ENERGY_CONSERVING": {horizon_attenuation: 1},
 }  # fmt: skip
-#: Macros of the shaders that a variable of a formula could be called.
-_MACROS = frozenset({"PI", "PAGE", "TEXELS"})
 _KINDS = {"1": "float", "2": "complex"}
 
 
@@ -61,7 +59,7 @@ def formulas(definitions: Mapping[str, str]) -> str:
 
 @functools.lru_cache(maxsize=64)
 def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> str:
-    program = Program(GLSL, _MACROS)
+    program = Program(GLSL)
     program.add(encoded_colour, "vector")
     if "DISPLAYED" in names:
         shown = shown_colour if "NATURAL" in names else encoded_colour

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Real
-from ...optics.colour import daylight
+from ...optics.colour import daylight, daylight_shares
 from ...scene.elements import name_of
 from ...shading.spectra import spectra_of, uploaded, vectors_of
 from .packing import daylight_colour
@@ -241,7 +241,7 @@ def radiance_along(emitter: Any, directions: Real) -> Real:
     values, waves = _relative(spectra_of(arriving, _WAVES, len(directions)))
     if values.ndim == 3:
         return values[:, 0]
-    return values @ np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
+    return values @ daylight_shares(waves)
 
 
 def _points(samples: int, start: int) -> Any:

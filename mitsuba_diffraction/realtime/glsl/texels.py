@@ -132,13 +132,10 @@ def paired(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.asarray(low >> 16 | high, np.uint32).view(np.float32)
 
 
-def plain(value: Any) -> Any:
+def plain(value: Uniform) -> Any:
     """Convert a uniform to JSON types; an array becomes one flat list."""
-    if isinstance(value, np.ndarray):
-        return value.ravel().tolist()
-    if isinstance(value, tuple):
-        return [plain(v) for v in value]
-    return value.item() if isinstance(value, np.generic) else value
+    array = np.asarray(value)
+    return array.ravel().tolist() if array.ndim else array.item()
 
 
 def distinct_rows(rows: NDArray[Scalar]) -> tuple[NDArray[Scalar], NDArray[np.uint32]]:
