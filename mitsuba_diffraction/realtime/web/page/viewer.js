@@ -25,7 +25,7 @@ const PLAIN = {
   exposure: 1,
   heights: 1,
   turn: 0,          // degrees by which patches are turned
-  pigment: null,    // linear sRGB in place of the pigments beneath
+  pigment: null,    // colour (#rrggbb) in place of the pigments beneath
 };
 
 class Viewer {
@@ -150,7 +150,7 @@ class Viewer {
     const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye };
     if (this.wavelength !== null) uniforms.wavenumber = (2e3 * Math.PI) / this.wavelength;
     const turn = (this.turn * Math.PI) / 180, { material, coherence, pigment } = this;
-    const base = material !== null && this.header.materials[material].absorbs ? DARK : pigment;
+    const base = material !== null && this.header.materials[material].absorbs ? DARK : pigment && colourOf(pigment);
     Object.assign(uniforms, { patch_turn: [Math.cos(turn), Math.sin(turn)], live_pigment: base ? [...base, 1] : [0, 0, 0, 0] });
     return { matrix, up: this.camera.up, method: this.drawn, heights: this.heights, material, coherence, uniforms };
   }
