@@ -200,7 +200,7 @@ def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) ->
 def _patch(described: Surface, placed: Mapping[str, Any]) -> OslShader:
     table = described.patch
     textures = patch_textures(table)
-    index = None if described.index is None else described.index(drawn_spectrum().wavelengths)
+    index = None if described.index is None else described.index(drawn_spectrum()[0])
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
     model = None if index is None else MODELS[described.model]
     statistic = table.roughness
@@ -282,11 +282,11 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
 
 def _source(shader: OslShader, sockets: Sequence[Socket], name: str) -> str:
     """Return the source of a shader: constants, the shared functions, and its own."""
-    spectrum = drawn_spectrum()
-    arrays = [array_parameter("float", "Wavelengths", spectrum.wavelengths)]
+    wavelengths, by_space = drawn_spectrum()
+    arrays = [array_parameter("float", "Wavelengths", wavelengths)]
     arrays += [
         array_parameter("color", f"Colours{n}", colours)
-        for n, colours in enumerate(spectrum.colours.values())
+        for n, colours in enumerate(by_space.values())
     ]
     declarations = [socket.declaration() for socket in sockets]
     parameters = [*declarations, *arrays, *shader.arrays, "output closure color BSDF = 0"]
