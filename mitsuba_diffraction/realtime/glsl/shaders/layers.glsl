@@ -42,7 +42,7 @@ vec3 albedo(vec3 w, vec2 rotation)
 {
     vec3 found = flat_reflectance(w.z);
 #if defined(BENEATH) && !defined(GLANCE)
-    found += albedo_excess(in_patch(w, rotation), w.z);
+    found += of_direction(in_patch(w, rotation), w.z).rgb;
 #endif
     return clamp(found, 0.0, 1.0);
 }

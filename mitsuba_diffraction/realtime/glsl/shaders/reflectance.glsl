@@ -87,12 +87,6 @@ vec4 of_direction(vec2 tangential, float cosine)
 
 #endif
 
-#ifdef BENEATH
-
-vec3 albedo_excess(vec2 tangential, float cosine) { return of_direction(tangential, cosine).rgb; }
-
-#endif
-
 #ifdef ENERGY_CONSERVING
 
 // Energy scale s of a direction, less at the horizon.
