@@ -47,7 +47,7 @@ from .texels import Packed, Uniform
 
 Image = NDArray[np.float32]
 # steps of two numbers each for the pixel, the lens, the shadow map and the lobes: fractional parts
-# of multiples of square roots of primes are independent (Richtmyer 1951); those of the golden
+# of multiples of square roots of primes are independent (Richtmyer 1951); multiples of the golden
 # ratio, (1 + √5)/2, are the most even, which matters most for lobes
 _STEPS = np.append(np.sqrt([2.0, 3.0, 7.0, 11.0, 13.0, 17.0]), [0.5 + 1.25**0.5, 19.0**0.5]) % 1.0
 

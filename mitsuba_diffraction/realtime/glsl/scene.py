@@ -205,7 +205,7 @@ class SceneSurface:
 def winding_of(triangles: Real) -> int:
     """Return 1 of closed triangles (n, 3, 3), counter-clockwise from outside, −1 clockwise, else 0.
 
-    Closed ones traverse each edge equally often in both directions.
+    Closed triangles traverse each edge equally often in both directions.
     """
     low = triangles.min(axis=(0, 1))
     step = max(float(np.ptp(triangles, axis=(0, 1)).max()), 1e-30) * _SAME

@@ -34,8 +34,8 @@ _OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
 def pack_gloss(bsdf: Any) -> Packed | None:
     """Pack the specular reflection of a BSDF that does not diffract, for shaders/gloss.glsl.
 
-    None for an unsupported kind. A metal and the principled BSDF have no transmittances `through`;
-    else the base has the BRDF ρ/π times those of both directions, over cosines even from 0 to 1.
+    None for an unsupported kind. The base of plastic has the BRDF ρ/π times the transmittances
+    `through` of both directions, tabulated at cosines even from 0 to 1.
     """
     import mitsuba as mi
 

@@ -39,7 +39,7 @@ _WIDEST = 0.1  # least cosine from the axis of a point light's perspective
 
 
 class ShadowMap(Resources):
-    """Shadow map of what a camera sees, which is redrawn for each light.
+    """Shadow map of the places that a camera sees, which is redrawn for each light.
 
     buffers : vertex buffers of the scene's surfaces.
     size : texels a side.

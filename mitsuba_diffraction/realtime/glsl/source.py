@@ -27,7 +27,7 @@ _CONSTANTS = {
     "COLOUR_NEAREST": "false", "AXIS_NEAREST": "false", "MASK_NEAREST": "false",
 }  # fmt: skip
 
-#: Files for what lobes look up.
+#: Files of the surroundings, which lobes look up.
 _LOOKED_UP = (
     "#if defined(WEIGHTED) || defined(LOOKED_UP)",
     "obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl",

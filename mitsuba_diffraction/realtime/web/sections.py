@@ -35,8 +35,8 @@ class Section:
 def packed_array(values: NDArray[Any]) -> Section:
     """Compress an array (rows, columns) without loss: its bits, or their differences if smaller.
 
-    Differences are those from the bits in the row before. All first bytes of a column are
-    adjacent, then all second bytes: similar bytes compress well.
+    Differences are from the bits in the row before. All first bytes of a column are adjacent, then
+    all second bytes: similar bytes compress well.
 
     values : values of a type that JavaScript has an array of, or half floats.
     """
