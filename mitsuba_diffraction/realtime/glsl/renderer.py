@@ -235,7 +235,7 @@ class Renderer(Resources):
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
             if (n, id(program)) not in self._arrays:
                 self._arrays[n, id(program)] = self.own(self.buffers[n].array(program))
-            enable_sides(self.context, surface.hides_itself_from(np.append(camera.eye, 1.0)))
+            enable_sides(self.context, surface.winding_from(np.append(camera.eye, 1.0)))
             self._arrays[n, id(program)].render()
         of_light.release()
 

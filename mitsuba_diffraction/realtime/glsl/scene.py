@@ -192,7 +192,7 @@ class SceneSurface:
         corners = self.vertices[:, :3].reshape(-1, 3, 3).astype(np.float64)
         return *box_of([self.vertices[:, :3]]), winding_of(corners)
 
-    def hides_itself_from(self, place: Real) -> int:
+    def winding_from(self, place: Real) -> int:
         """Return the winding of a surface that is closed and seen from outside, else 0.
 
         place : (4,) position and 1, or direction and 0.

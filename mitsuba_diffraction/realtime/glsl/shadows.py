@@ -100,7 +100,7 @@ class ShadowMap(Resources):
                 return None
             # the map looks along its z axis, which reverses the triangles' orientation: triangles
             # that face away from the light hide all that the others hide
-            return one.hides_itself_from(self._camera) and one.hides_itself_from(light.place)
+            return one.winding_from(self._camera) and one.winding_from(light.place)
 
         self._draw(self._frame, matrix, sides)
         cone = (0.0, 0.0)
