@@ -83,9 +83,11 @@ def add_material(
     surface = _node(nodes, "ShaderNodeGroup", (0, 0))
     surface.node_tree = group
     surface.label, surface.width = group.name, 240
-    _link_tangent(nodes, links, surface, tangent)
-    _link_hologram(nodes, links, surface, orientation, stretch)
-    last = surface if weight is None else _masked(nodes, links, surface, weight)
+    if "Tangent" in surface.inputs:  # of a node, whose direction an artist can change
+        node = _node(nodes, "ShaderNodeTangent", (-240, -120))
+        node.direction_type, node.axis = TANGENTS[tangent]
+        links.new(node.outputs[0], surface.inputs["Tangent"])
+    last = _hologram(nodes, links, surface, orientation, stretch, weight)
     links.new(last.outputs[0], _node(nodes, "ShaderNodeOutputMaterial", (520, 0)).inputs[0])
     return material
 
@@ -101,14 +103,12 @@ def check_blender() -> None:
             "'blender --python', or after 'pip install bpy'"
         )
     if bpy.app.version < OLDEST:
+        oldest = ".".join(map(str, OLDEST))
         raise MaterialError(
-            f"Blender {bpy.app.version_string} is too old; the shader needs Blender "
-            f"{OLDEST[0]}.{OLDEST[1]} or newer"
+            f"Blender {bpy.app.version_string} is too old; the shader needs {oldest} or newer"
         )
     try:
-        import _cycles
-
-        with_osl = _cycles.with_osl
+        from _cycles import with_osl
     except ModuleNotFoundError:
         with_osl = False
     if not with_osl:
@@ -126,8 +126,9 @@ def give_material(target: Any, material: Any, slot: str = "") -> None:
     Raises a MaterialError that lists the slots if it is none of them, or several.
     """
     names = [entry.name or "empty" for entry in target.material_slots]
-    listed = ", ".join(f"{number} {name}" for number, name in enumerate(names, 1)) or "none"
-    if slot and slot not in (*names, *(str(number) for number in range(1, len(names) + 1))):
+    numbers = [str(number) for number in range(1, len(names) + 1)]
+    listed = ", ".join(map(" ".join, zip(numbers, names, strict=True))) or "none"
+    if slot and slot not in (*names, *numbers):
         raise MaterialError(f"'{target.name}' has no slot '{slot}'; it has {listed}")
     if not slot and len(names) > 1:
         raise MaterialError(f"'{target.name}' has several slots: name one by --slot: {listed}")
@@ -147,40 +148,35 @@ def read_folder(folder: Path, shared: Path | None = None) -> dict[str, Any]:
 
     Raises a MaterialError if the folder is not one, or names files elsewhere.
     """
-    documents = sorted(
-        file
-        for file in folder.glob("*.json")
-        if _is_own(file) and _is_own(file.with_suffix(".osl"))
-    )
+    pairs = [(file, file.with_suffix(".osl")) for file in folder.glob("*.json")]
+    documents = [pair[0] for pair in pairs if all(map(_is_own, pair))]
     if len(documents) != 1:
         raise MaterialError(
             f"expected one shader (.osl with .json) in '{folder}', got {len(documents)}; name the "
             "folder that 'mitsuba-diffraction export-osl' wrote"
         )
+
+    def named(where: Path, name: str, suffix: str) -> Path:
+        """Return the path of a file that the document names, without any folder."""
+        if Path(name).name != name or Path(name).suffix != suffix:
+            raise ValueError(f"{name!r} is not the name of a file *{suffix} in this folder")
+        return where.resolve() / name
+
     try:
-        exported = json.loads(documents[0].read_text(encoding="utf-8"))
-        exported["shader"] = _file(folder, exported["shader"], ".osl")
-        exported["textures"] = {
-            key: _file(shared or folder, name, ".exr") for key, name in exported["textures"].items()
-        }
+        exported = dict(json.loads(documents[0].read_text(encoding="utf-8")))
+        exported["shader"] = named(folder, exported["shader"], ".osl")
+        textures = exported["textures"].items()
+        exported["textures"] = {key: named(shared or folder, n, ".exr") for key, n in textures}
         inputs = [(entry["identifier"], entry["label"]) for entry in exported["inputs"]]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise MaterialError(
-            f"cannot read '{documents[0]}' ({error}); export the shader again"
-        ) from error
+        message = f"cannot read '{documents[0]}' ({error}); export the shader again"
+        raise MaterialError(message) from error
     files = [exported["shader"], *exported["textures"].values()]
     if not inputs or not all(map(_is_own, files)):
         raise MaterialError(
             f"'{folder}' is incomplete, or has links in place of files; export the shader again"
         )
-    return dict(exported)
-
-
-def _file(folder: Path, name: str, suffix: str) -> Path:
-    """Return the path of a file that the document names; only names in its folder are allowed."""
-    if Path(name).name != name or Path(name).suffix != suffix:
-        raise ValueError(f"{name!r} is not the name of a file *{suffix} in this folder")
-    return folder.resolve() / name
+    return exported
 
 
 def _is_own(file: Path) -> bool:
@@ -193,13 +189,9 @@ def own_data(blocks: Any, name: str, shader: Path, *kind: str) -> Any:
 
     blocks : materials or node groups of the file; kind : further arguments of a new one.
     """
-    for block in blocks:
-        made_by = block.get(_SHADER)
-        known = made_by is not None and block.get(_NAME) == name
-        if known and (made_by == str(shader) or not Path(made_by).exists()):
-            break
-    else:
-        block = blocks.new(name, *kind)
+    named = [block for block in blocks if block.get(_SHADER) and block.get(_NAME) == name]
+    own = (b for b in named if b[_SHADER] == str(shader) or not Path(b[_SHADER]).exists())
+    block = next(own, None) or blocks.new(name, *kind)
     block[_SHADER], block[_NAME] = str(shader), name
     return block
 
@@ -212,7 +204,11 @@ def _group(exported: dict[str, Any], name: str) -> Any:
     shader = exported["shader"]
     script = _node(group.nodes, "ShaderNodeScript", (0, 0))
     script.mode, script.label, script.width = "EXTERNAL", shader.name, 240
-    _find_oslquery()
+    # the package bpy brings `oslquery`, but does not put it on the path
+    version = "python{}.{}".format(*sys.version_info[:2])
+    site = Path(bpy.utils.resource_path("LOCAL"), "python/lib", version, "site-packages")
+    if site.is_dir() and str(site) not in sys.path:
+        sys.path.append(str(site))
     script.filepath = str(shader)  # compiles, and makes the sockets
     if not script.outputs:
         raise MaterialError(f"Blender could not compile '{shader}'; its console says why")
@@ -228,42 +224,25 @@ def _group(exported: dict[str, Any], name: str) -> Any:
             outer = group.interface.new_socket(
                 entry["label"], in_out="INPUT", socket_type=socket.bl_idname
             )
-            _describe(outer, socket, entry)
+            outer.description, outer.hide_value = entry["help"], socket.hide_value
+            if entry.get("kind") == "color":
+                colour = mathutils.Color(entry["default"]).from_rec709_linear_to_scene_linear()
+                outer.default_value = (*colour, 1.0)
+            elif not socket.hide_value:
+                outer.default_value = socket.default_value
             group.links.new(inside.outputs[entry["label"]], socket)
     group.interface.new_socket("BSDF", in_out="OUTPUT", socket_type="NodeSocketShader")
     group.links.new(script.outputs[0], outside.inputs["BSDF"])
     return group
 
 
-def _find_oslquery() -> None:
-    """Let Python find `oslquery`, which the package bpy brings but does not put on the path."""
-    version = "python{}.{}".format(*sys.version_info[:2])
-    site = Path(bpy.utils.resource_path("LOCAL"), "python/lib", version, "site-packages")
-    if site.is_dir() and str(site) not in sys.path:
-        sys.path.append(str(site))
+def _hologram(
+    nodes: Any, links: Any, surface: Any, orientation: Any, stretch: Any, weight: Any
+) -> Any:
+    """Link pictures of a hologram to the inputs of a group, and return the node of the whole.
 
-
-def _describe(outer: Any, socket: Any, entry: dict[str, Any]) -> None:
-    """Give an input of a group the default and tooltip of its parameter."""
-    outer.description = entry["help"]
-    outer.hide_value = socket.hide_value
-    if entry.get("kind") == "color":
-        colour = mathutils.Color(entry["default"]).from_rec709_linear_to_scene_linear()
-        outer.default_value = (*colour, 1.0)
-    elif not socket.hide_value:
-        outer.default_value = socket.default_value
-
-
-def _link_tangent(nodes: Any, links: Any, surface: Any, tangent: str) -> None:
-    """Link a Tangent node, whose direction an artist can change, to a group that takes it."""
-    if "Tangent" in surface.inputs:
-        node = _node(nodes, "ShaderNodeTangent", (-240, -120))
-        node.direction_type, node.axis = TANGENTS[tangent]
-        links.new(node.outputs[0], surface.inputs["Tangent"])
-
-
-def _link_hologram(nodes: Any, links: Any, surface: Any, orientation: Any, stretch: Any) -> None:
-    """Link pictures of a hologram to the inputs of a group."""
+    By a picture of its share, the group is mixed with plain metal.
+    """
 
     def channels_of(file: Any, height: float) -> Any:
         channels = _node(nodes, "ShaderNodeSeparateColor", (-700, height))
@@ -280,14 +259,11 @@ def _link_hologram(nodes: Any, links: Any, surface: Any, orientation: Any, stret
         links.new(degrees.outputs[0], surface.inputs["Rotation (°)"])
     if stretch is not None:
         if "Stretch" not in surface.inputs:
-            raise MaterialError(
-                "solved orders cannot be stretched; export a patch of heights for --stretch"
-            )
+            remedy = "export a patch of heights for --stretch"
+            raise MaterialError(f"solved orders cannot be stretched; {remedy}")
         links.new(channels_of(stretch, -320)[0], surface.inputs["Stretch"])
-
-
-def _masked(nodes: Any, links: Any, surface: Any, weight: Any) -> Any:
-    """Return a mix of plain metal and a group, by a picture of the group's share."""
+    if weight is None:
+        return surface
     mix = _node(nodes, "ShaderNodeMixShader", (320, 0))
     blank = _node(nodes, "ShaderNodeBsdfAnisotropic", (60, 300))
     blank.inputs["Roughness"].default_value = 0.25  # of the slopes: α = 0.06
@@ -324,14 +300,6 @@ def _node(nodes: Any, kind: str, location: tuple[float, float]) -> Any:
     return node
 
 
-def _folders() -> list[Path]:
-    """Return where the shader may be: FOLDER, beside this file, beside texts of the .blend."""
-    if FOLDER:
-        return [Path(FOLDER)]
-    texts = [bpy.path.abspath(text.filepath) for text in bpy.data.texts if text.filepath]
-    return [Path(file).parent for file in (__file__, *texts)]
-
-
 def _arguments(words: Sequence[str]) -> argparse.Namespace:
     """Parse the command line, of which Blender's part ends with `--`."""
     parser = argparse.ArgumentParser(prog="blender_material.py", description=__doc__.split("\n")[0])
@@ -339,22 +307,16 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--name", default="", help="of the material; default: the shader's name")
     parser.add_argument("--object", help="mesh object that gets the material")
     parser.add_argument("--slot", default="", help="its slot, by material or number from 1")
-    parser.add_argument(
-        "--tangent", choices=TANGENTS, default="uv", help="direction of the patch's x axis"
-    )
-    pictures = {
-        "orientation": "cosine and sine of the angle", "stretch": "factor on lengths",
-        "weight": "share of the patch",
-    }  # fmt: skip
-    for key, content in pictures.items():
-        parser.add_argument(f"--{key}", type=Path, help=f"picture of a hologram: {content}")
+    along = "direction of the patch's x axis"
+    parser.add_argument("--tangent", choices=TANGENTS, default="uv", help=along)
+    picture = "picture of a hologram: "
+    parser.add_argument("--orientation", type=Path, help=f"{picture}cosine and sine of the angle")
+    parser.add_argument("--stretch", type=Path, help=f"{picture}factor on lengths")
+    parser.add_argument("--weight", type=Path, help=f"{picture}share of the patch")
     parser.add_argument("--working-space", help="working space of the file; default: as it is")
     parser.add_argument("--blend", type=Path, help=".blend file to add to; default: the open one")
-    parser.add_argument(
-        "--output",
-        type=Path,
-        help=".blend file to write; default: beside --blend, with _diffraction in its name",
-    )
+    written = ".blend file to write; default: beside --blend, with _diffraction in its name"
+    parser.add_argument("--output", type=Path, help=written)
     return parser.parse_args(words)
 
 
@@ -366,10 +328,21 @@ def run(words: Sequence[str]) -> None:
     if arguments.blend:
         with _naming(f"cannot open '{arguments.blend}'"):
             bpy.ops.wm.open_mainfile(filepath=str(arguments.blend.resolve()), load_ui=False)
-    if arguments.working_space:
-        _set_working_space(arguments.working_space)
-    folders = [arguments.folder] if arguments.folder else _folders()
-    folder = next((path for path in folders if any(path.glob("*.osl"))), folders[0])
+    if name := arguments.working_space:
+        try:
+            bpy.ops.wm.set_working_color_space(working_space=name)
+        except TypeError as error:  # the message lists the names
+            names = str(error).rpartition(" not found in ")[2] or "the names in Blender's panel"
+            message = f"working space '{name}' is unknown; choose one of {names}"
+            raise MaterialError(message) from error
+        for node in (n for g in bpy.data.node_groups if _SHADER in g for n in g.nodes):
+            if node.type == "SCRIPT":
+                node.inputs["Working Space"].default_value = name
+    folder = arguments.folder or (Path(FOLDER) if FOLDER else None)
+    if folder is None:  # beside this file, or beside texts of the .blend
+        texts = [bpy.path.abspath(text.filepath) for text in bpy.data.texts if text.filepath]
+        beside = [Path(file).parent for file in (__file__, *texts)]
+        folder = next((path for path in beside if any(path.glob("*.osl"))), beside[0])
     material = add_material(
         folder, name=arguments.name, tangent=arguments.tangent,
         orientation=arguments.orientation, stretch=arguments.stretch, weight=arguments.weight,
@@ -387,39 +360,24 @@ def run(words: Sequence[str]) -> None:
             raise MaterialError(f"cannot write '{output}': its folder does not exist")
         with _naming(f"cannot write '{output}'"):
             bpy.ops.wm.save_as_mainfile(filepath=str(output.resolve()), check_existing=False)
-    print(
-        f"added the material '{material.name}' of {folder}" + (f", in {output}" if output else "")
-    )
+    place = f", in {output}" if output else ""
+    print(f"added the material '{material.name}' of {folder}{place}")
 
 
 def _output(arguments: argparse.Namespace) -> Path | None:
     """Return the file to write; None leaves it to the user of Blender's window."""
     if arguments.slot and not arguments.object:
         raise MaterialError("--slot is of an object: name it by --object")
-    if arguments.output:
-        return Path(arguments.output)
+    output: Path | None = arguments.output
+    if output or not (arguments.blend or bpy.app.background):
+        return output
     file: Path = arguments.blend or Path(bpy.data.filepath)
-    if not (arguments.blend or bpy.app.background):
-        return None
     if not file.name:
         raise MaterialError("nothing would be saved: name a file by --output, or by --blend")
     copy = file.with_name(f"{file.stem}_diffraction.blend")
     if copy.exists():
         raise MaterialError(f"'{copy}' is there already: name a file by --output, it or another")
     return copy
-
-
-def _set_working_space(name: str) -> None:
-    """Set the working space of the open file, and convert its colours."""
-    try:
-        bpy.ops.wm.set_working_color_space(working_space=name)
-    except TypeError as error:  # the message lists the names
-        names = str(error).rpartition(" not found in ")[2] or "the names in Blender's panel"
-        raise MaterialError(f"working space '{name}' is unknown; choose one of {names}") from error
-    for group in bpy.data.node_groups:
-        if _SHADER in group:
-            for node in (n for n in group.nodes if n.type == "SCRIPT"):
-                node.inputs["Working Space"].default_value = name
 
 
 def main() -> None:
@@ -430,8 +388,7 @@ def main() -> None:
     try:
         run(words)
     except MaterialError as error:
-        message = f"blender_material.py: error: {error}"
-        print(message, file=sys.stderr)
+        print(message := f"blender_material.py: error: {error}", file=sys.stderr)
         if bpy is None or bpy.app.background:
             sys.exit(1)
         bpy.context.window_manager.popup_menu(

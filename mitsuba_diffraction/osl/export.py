@@ -23,6 +23,7 @@ from ..orders import OrderTable
 from ..plugin.description import Consumer, Feature, Surface
 from ..shading import dialects
 from ..shading.orders import pack_orders
+from ..shading.spectra import spectra_of
 from ..tables import write_channels
 from .formulas import order_formulas, patch_formulas, shader_file
 from .patch import (
@@ -199,7 +200,7 @@ def _orders(described: Surface, table: OrderTable, placed: Mapping[str, Any]) ->
 def _patch(described: Surface, placed: Mapping[str, Any]) -> OslShader:
     table = described.patch
     textures = patch_textures(table)
-    index = None if described.index is None else described.index(drawn_spectrum().wavelengths)
+    index = None if described.index is None else described.index(drawn_spectrum()[0])
     parts = np.full(NODES, 1.5 + 0j) if index is None else index
     model = None if index is None else MODELS[described.model]
     statistic = table.roughness
@@ -260,7 +261,15 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
     placed = any(key.endswith("to_uv") for key in mi.traverse(bsdf).keys())  # noqa: SIM118
     if bsdf.class_name() != "SmoothDiffuse" or placed:
         raise DiffractionError(refusal)
-    places = [_reflectance(bsdf, uv, lam) for uv in ((0.3, 0.3), (0.7, 0.2), (0.6, 0.9))]
+
+    def reflectance_at(uv: tuple[float, float]) -> Any:
+        def look_up(si: Any) -> Any:
+            si.uv, si.wi = mi.Point2f(*uv), mi.Vector3f(0.0, 0.0, 1.0)
+            return bsdf.eval_diffuse_reflectance(si)
+
+        return spectra_of(look_up, lam)[0].astype(np.float64)
+
+    places = [reflectance_at(uv) for uv in ((0.3, 0.3), (0.7, 0.2), (0.6, 0.9))]
     if np.ptp(places, axis=0).max() > 1e-4:  # rounding of single precision is far below
         raise DiffractionError(refusal)
     colour = places[0]
@@ -271,34 +280,13 @@ def pigment_of(described: Surface) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _reflectance(
-    bsdf: Any, uv: tuple[float, float], wavelengths: NDArray[np.floating]
-) -> NDArray[np.float64]:
-    """Return a BSDF's diffuse reflectance at wavelengths (n,), or (3,) in RGB and (1,) in mono."""
-    import drjit as dr
-    import mitsuba as mi
-
-    parts = []
-    for start in range(0, len(wavelengths), 4):
-        si = dr.zeros(mi.SurfaceInteraction3f)
-        si.uv, si.wi = mi.Point2f(*uv), mi.Vector3f(0.0, 0.0, 1.0)
-        if mi.is_spectral:
-            four = wavelengths[start : start + 4]
-            si.wavelengths = mi.Spectrum(*(float(wavelength) for wavelength in four))
-        value = mi.unpolarized_spectrum(bsdf.eval_diffuse_reflectance(si))
-        parts.append(np.array(value, np.float64).ravel())
-        if not mi.is_spectral:
-            break
-    return np.concatenate(parts)
-
-
 def _source(shader: OslShader, sockets: Sequence[Socket], name: str) -> str:
     """Return the source of a shader: constants, the shared functions, and its own."""
-    spectrum = drawn_spectrum()
-    arrays = [array_parameter("float", "Wavelengths", spectrum.wavelengths)]
+    wavelengths, by_space = drawn_spectrum()
+    arrays = [array_parameter("float", "Wavelengths", wavelengths)]
     arrays += [
         array_parameter("color", f"Colours{n}", colours)
-        for n, colours in enumerate(spectrum.colours.values())
+        for n, colours in enumerate(by_space.values())
     ]
     declarations = [socket.declaration() for socket in sockets]
     parameters = [*declarations, *arrays, *shader.arrays, "output closure color BSDF = 0"]

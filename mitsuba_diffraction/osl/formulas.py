@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Callable
 from importlib import resources
 from typing import Any
@@ -39,7 +38,7 @@ def shader_file(name: str) -> str:
 
 def order_formulas() -> str:
     """Return the formulas that `shaders/orders.osl` calls."""
-    program = _program()
+    program = Program(OSL)
     functions: dict[Callable[..., Any], int] = {
         **FORMULAS, face_transmittance: 2, passage: 2, order_direction: 4,
     }  # fmt: skip
@@ -56,11 +55,11 @@ def patch_formulas(model: Model | None, coated: bool = False) -> str:
 
     Raises a DiffractionError if the model's formula cannot be written in OSL.
     """
-    program = _program()
+    program = Program(OSL)
     jones = None if model is None else model.jones
     program.add(
         pair_power, jones, "vector", "vector", "complex", "float", "float",
-        Coat("float", "float", "float") if coated else None, name="boundary_factor",
+        Coat("float", "float", "float") if coated else None,
     )  # fmt: skip
     if coated:
         program.add(refracted, "vector", "float")
@@ -75,10 +74,3 @@ def patch_formulas(model: Model | None, coated: bool = False) -> str:
 def _everything(cosine: Any, index: Any) -> float:
     """Return the reflectance of a perfect reflector."""
     return 1.0
-
-
-def _program() -> Program:
-    """Return an empty program; its variables are never called like a macro of the shaders."""
-    files = resources.files(__package__).joinpath("shaders").iterdir()
-    text = "".join(shader_file(file.name) for file in files)
-    return Program(OSL, frozenset(re.findall(r"\b[A-Z][A-Z_0-9]+\b", text)))

@@ -49,7 +49,7 @@ def order_constants(table: OrderTable, packed: PackedOrders) -> dict[str, float 
 
 def _samples(period: float) -> int:
     """Return the number of wavelengths whose orders are lobes of a sample; period : µm."""
-    wavelengths = drawn_spectrum().wavelengths
+    wavelengths, _ = drawn_spectrum()
     for count in range(_MOST_SAMPLES, 1, -1):
         # the shortest wavelength of each stratum has the most orders
         shortest = np.interp(np.arange(count) / count, np.linspace(0, 1, NODES), wavelengths)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,22 +17,12 @@ _STEP = 0.25
 _IMPORTANCE = (0.3, 0.5, 0.2)
 
 
-class WavelengthSampling(NamedTuple):
-    """Wavelengths at even steps of a random number u from 0 to 1, and their weights.
+def drawn_spectrum() -> tuple[NDArray[np.float64], dict[str, NDArray[np.float64]]]:
+    """Tabulate wavelengths and weights under daylight, at even steps of a number u from 0 to 1.
 
-    Attributes
-    ----------
-    wavelengths : (NODES,) nm.
-    colours : by working space (NODES, 3), linear RGB, negative outside its gamut. Means of their
-        linear interpolation over u are white, (1, 1, 1).
+    Returns wavelengths (NODES,) in nm; by working space colours (NODES, 3), linear RGB, negative
+    outside its gamut. Means of their linear interpolation over u are white, (1, 1, 1).
     """
-
-    wavelengths: NDArray[np.float64]
-    colours: dict[str, NDArray[np.float64]]
-
-
-def drawn_spectrum() -> WavelengthSampling:
-    """Tabulate wavelengths and weights under daylight."""
     lam = np.arange(ENDS[0] + 0.5 * _STEP, ENDS[1], _STEP)
     exact = {
         space: np.asarray(linear_in(space, response(lam)), np.float64) for space in WORKING_SPACES
@@ -45,9 +33,7 @@ def drawn_spectrum() -> WavelengthSampling:
     cumulative /= cumulative[-1]
     u = np.linspace(0.0, 1.0, NODES)
     wavelengths = np.interp(u, cumulative, np.append(lam - 0.5 * _STEP, ENDS[1]))
-    return WavelengthSampling(
-        wavelengths, {space: _weights(u, cumulative, values) for space, values in exact.items()}
-    )
+    return wavelengths, {space: _weights(u, cumulative, each) for space, each in exact.items()}
 
 
 def _weights(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..optics.arithmetic import Number, of
+from ..optics.arithmetic import Number
 from ..optics.boundary import Direction, Geometry, Heights, Jones, geometry, power
 from ..optics.coat import coated_power, crossing
 from ..optics.fresnel import Index
@@ -54,18 +54,3 @@ def pair_power(
         came, left = crossing(coat.cos_i, coat.n), crossing(coat.cos_o, coat.n)
         return coated_power(matrix, pair, index, came, left)
     return power(matrix)
-
-
-def relative_power(
-    jones: Callable[[Geometry, Index, Heights], Jones],
-    wi: Direction,
-    wo: Direction,
-    index: Index,
-    kappa: Number,
-    variance: Number,
-    coat: Coat | None = None,
-) -> Number:
-    """Return N' / (1 + ωi·ωo)²; Kirchhoff's is R(cosθ_half). Arguments as for `pair_power`."""
-    # not 0 of opposite grazing directions
-    edge = of(kappa).maximum(geometry(wi, wo).one_plus_dot, 1e-12)
-    return pair_power(jones, wi, wo, index, kappa, variance, coat) / (edge * edge)

@@ -11,7 +11,7 @@ import inspect
 import math
 import re
 import textwrap
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,13 +31,9 @@ _ATOM = 9
 
 @dataclass
 class Program:
-    """Functions in a dialect.
-
-    macros : names that variables must not have.
-    """
+    """Functions in a dialect."""
 
     dialect: Dialect
-    macros: frozenset[str] = frozenset()
     functions: dict[str, str] = field(default_factory=dict)
 
     def add(self, formula: Callable[..., Any], *arguments: Any, name: str = "") -> None:
@@ -56,45 +52,9 @@ class Program:
         parameters, results = self._run(formula, arguments)
         self.functions[name] = parameters.written(name, results, _comment(formula))
 
-    def add_staged(
-        self,
-        formula: Callable[..., Any],
-        *arguments: Any,
-        late: Sequence[str],
-        names: Sequence[str],
-    ) -> None:
-        """Write a formula as two functions: one prepares all that some parameters do not change.
-
-        The prepared values are global variables, for languages that have them.
-
-        Parameters
-        ----------
-        formula, arguments : as for `add`; the result is one number.
-        late : parameters of the second function; the others belong to the first.
-        names : of both functions.
-        """
-        parameters, results = self._run(formula, arguments)
-        first, second = parameters.split(late)
-        changing = {id(leaf) for leaf in second.leaves}
-        for symbol in parameters.trace.order:
-            if any(id(part) in changing for part in symbol.parts):
-                changing.add(id(symbol))
-        read = [part for s in _needed(results.values()) if id(s) in changing for part in s.parts]
-        read += [part for result in results.values() for part in _parts(result)]
-        ready = {id(s): s for s in read if isinstance(s, Symbol) and id(s) not in changing}
-        stored = {f"pair_{s.name or n}": s for n, s in enumerate(ready.values())}
-        float_ = self.dialect.types["float"]
-        head = "".join(
-            f"{line}\n" for line in textwrap.wrap(f"{float_} {', '.join(stored)};", _WIDTH)
-        )
-        early = first.written(names[0], stored, f"Prepare `{names[1]}`.", stored=True)
-        self.functions[names[0]] = f"{head}\n{early}"
-        second.known = {id(symbol): name for name, symbol in stored.items()}
-        self.functions[names[1]] = second.written(names[1], results, _comment(formula))
-
     def _run(self, formula: Callable[..., Any], arguments: Sequence[Any]) -> Any:
         """Run a formula on symbols; return its parameters, and its results by name."""
-        parameters = _Parameters(self.dialect, self.macros, Trace())
+        parameters = _Parameters(self.dialect, Trace())
         names = inspect.signature(formula).parameters
         values = [parameters.add(*pair) for pair in zip(names, arguments, strict=False)]
         result = formula(*values)
@@ -115,12 +75,10 @@ class Program:
 class _Parameters:
     """Parameters of a function that is written, and the text of its expressions."""
 
-    def __init__(self, dialect: Dialect, macros: frozenset[str], trace: Trace) -> None:
-        self.dialect, self.macros, self.trace = dialect, macros, trace
+    def __init__(self, dialect: Dialect, trace: Trace) -> None:
+        self.dialect, self.trace = dialect, trace
         self.kinds: dict[str, str] = {}
-        self.leaves: list[Symbol] = []
         self.known: dict[int, str] = {}
-        self._owners: dict[int, str] = {}
         self._taken: set[str] = set()
 
     def add(self, name: str, argument: Any) -> Any:
@@ -135,27 +93,14 @@ class _Parameters:
         self.kinds[word] = argument
         parts = [f"{word}{self.dialect.components[part]}" for part in _COMPONENTS.get(argument, ())]
         symbols = [Symbol("float", "name", (text,), self.trace) for text in parts or [word]]
-        self.leaves += symbols
-        self._owners |= {id(symbol): word for symbol in symbols}
         if argument == "complex":
             return Complex(*symbols)
         return tuple(symbols) if argument == "vector" else symbols[0]
 
-    def split(self, late: Sequence[str]) -> tuple[_Parameters, _Parameters]:
-        """Return the parameters without those named in `late`, and those alone."""
-        parts = []
-        for chosen in (False, True):
-            part = _Parameters(self.dialect, self.macros, self.trace)
-            part.kinds = {n: kind for n, kind in self.kinds.items() if (n in late) == chosen}
-            part.leaves = [s for s in self.leaves if (self._owners[id(s)] in late) == chosen]
-            part._taken = set(self.kinds)
-            parts.append(part)
-        return parts[0], parts[1]
-
     def take(self, name: str) -> str:
         """Return a name for a variable that is new in the function and legal in the language."""
         name = re.sub(r"\W", "", name.encode("ascii", "ignore").decode()).strip("_") or "value"
-        if name in self.macros or name in self.dialect.reserved:
+        if name.isupper() or name in self.dialect.reserved:  # macros of the shaders are upper-case
             name += "_"
         numbered, n = name, 1
         while numbered in self._taken:
@@ -164,28 +109,20 @@ class _Parameters:
         self._taken.add(numbered)
         return numbered
 
-    def written(
-        self, name: str, results: Mapping[str, Any], comment: str, *, stored: bool = False
-    ) -> str:
+    def written(self, name: str, results: Mapping[str, Any], comment: str) -> str:
         """Write a function with its comment.
 
         results : by name; one without a name is returned.
-        stored : whether the results are global variables.
         """
         types = self.dialect.types
         uses: dict[int, int] = {}
-        for symbol in _needed(results.values(), self.known):
-            for part in symbol.parts:
-                uses[id(part)] = uses.get(id(part), 0) + 1
-        for result in results.values():
-            for part in _parts(result):
-                uses[id(part)] = uses.get(id(part), 0) + 1
+        read = [part for result in results.values() for part in _parts(result)]
+        for part in [*read, *(part for symbol in _needed(read) for part in symbol.parts)]:
+            uses[id(part)] = uses.get(id(part), 0) + 1
         lines: list[str] = []
         for symbol in self.trace.order:
             often = uses.get(id(symbol), 0)
-            if id(symbol) in self.known or not often:
-                continue
-            if symbol.name or (often > 1 and not _signed_leaf(symbol)):
+            if often and (symbol.name or (often > 1 and not _signed_leaf(symbol))):
                 word = self.take(symbol.name or f"t{len(self.known)}")
                 lines += _wrapped(f"{types[symbol.kind]} {word} = {self.text(symbol)};")
                 self.known[id(symbol)] = word
@@ -194,9 +131,8 @@ class _Parameters:
             lines += _wrapped(f"{start} {self.text(result)};")
         words = [f"{types[kind]} {word}" for word, kind in self.kinds.items()]
         kind = "void" if "" not in results else types[_kind(results[""])]
-        if not stored:
-            outputs = [(w, r) for w, r in results.items() if w]
-            words += [f"{self.dialect.result} {types[_kind(r)]} {w}" for w, r in outputs]
+        outputs = [(w, r) for w, r in results.items() if w]
+        words += [f"{self.dialect.result} {types[_kind(r)]} {w}" for w, r in outputs]
         joined = ", ".join(word.replace(" ", _JOINT) for word in words)
         head = textwrap.wrap(
             f"{kind} {name}({joined})", _WIDTH, subsequent_indent=" " * (len(kind) + len(name) + 2)
@@ -231,16 +167,13 @@ class _Parameters:
         return f"{self.text(parts[0], own)} {operation} {self.text(parts[1], own + 1)}", own
 
 
-def _needed(results: Iterable[Any], known: Container[int] = ()) -> list[Symbol]:
-    """Return the expressions that results depend on, and these, each once.
-
-    known : addresses of variables, whose own parts are not needed.
-    """
+def _needed(results: Iterable[Any]) -> list[Symbol]:
+    """Return the expressions that results depend on, and these, each once."""
     found: dict[int, Symbol] = {}
-    waiting = [part for result in results for part in _parts(result)]
+    waiting = list(results)
     while waiting:
         symbol = waiting.pop()
-        if isinstance(symbol, Symbol) and id(symbol) not in found and id(symbol) not in known:
+        if isinstance(symbol, Symbol) and id(symbol) not in found:
             found[id(symbol)] = symbol
             waiting += symbol.parts
     return list(found.values())

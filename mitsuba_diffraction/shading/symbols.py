@@ -161,10 +161,7 @@ class Symbol:
     def __float__(self) -> NoReturn:
         refuse("it needs a value; a shader's numbers have none before it runs")
 
-    def __complex__(self) -> NoReturn:
-        self.__float__()
-
-    __int__ = __index__ = __len__ = __iter__ = __float__
+    __complex__ = __int__ = __index__ = __len__ = __iter__ = __float__
 
     def __getattr__(self, name: str) -> NoReturn:
         if name.startswith("__"):  # protocols that Python asks for

@@ -245,12 +245,12 @@ def test_order_follows_the_grating_equation(tmp_path):
         exported_table(one, tmp_path, orientation=30), [theta], sky=(cos, sin, 0.0, 1.0, 1),
         WorkingSpace="ACEScg",
     )  # fmt: skip
-    spectrum = drawn_spectrum()
+    wavelengths, by_space = drawn_spectrum()
     u = (np.arange(4000) + 0.5) / 4000
     nodes = np.linspace(0.0, 1.0, NODES)
-    colours = spectrum.colours["ACEScg"]
+    colours = by_space["ACEScg"]
     weights = np.stack([np.interp(u, nodes, column) for column in colours.T])
-    mean = (weights @ np.interp(u, nodes, spectrum.wavelengths)) / 4000
+    mean = (weights @ np.interp(u, nodes, wavelengths)) / 4000
     expected = 1.0 + 1e-3 * mean / PERIOD - np.sin(np.radians(theta)) * cos
     # four standard errors, of some 0.001 of the light; a wavelength of 3 nm
     assert np.all(np.abs(seen.mean[0] - expected) < 4 * seen.error[0] + 1e-3)

@@ -88,5 +88,5 @@ def test_page(tab: Any, model: Model, tmp_path: Path) -> None:
     assert opened.open(path) == "ready"
     assert opened.said == []
     own = formulas({"BOUNDARY": model.name, "SURFACE_KIND": "1"})
-    factor = own[own.index("float boundary_factor") :]
+    factor = own[own.index("float pair_power") :]
     assert any(factor in text for text in opened.page.evaluate("viewer.drawing.sources"))

@@ -22,7 +22,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.plugin.description import describe
 from mitsuba_diffraction.realtime.glsl import Renderer, renderer
-from mitsuba_diffraction.realtime.glsl.shader_materials import GLSL
+from mitsuba_diffraction.realtime.glsl.features import GLSL
 from mitsuba_diffraction.realtime.web.export import make_page
 from mitsuba_diffraction.scene import read_exr
 from tests.support.blender import blender, result_of

@@ -24,9 +24,8 @@ in vec3 wi; in vec3 wo; in vec2 heights; out float result;
 void main()
 {{
     {body}
-    float one = 0.5 * dot(a + b, a + b);
     gl_Position = vec4(heights, 0.0, 1.0);  // keeps them where a model reads none
-    result = one * one * boundary_factor({late}heights.x, heights.y);
+    result = pair_power(a, b, {index}, heights.x, heights.y{outside});
 }}
 """
 
@@ -38,16 +37,12 @@ def shaded(gl: Any, given: Pairs, model: Model, index: complex, coated: bool) ->
     relative = index / n
     text = f"{relative.real:.9g}" if real else f"vec2({relative.real:.9g}, {relative.imag:.9g})"
     definitions = {"BOUNDARY": model.name, "SURFACE_KIND": "1" if real else "2"}
-    early = "a, b" + (f", {text}" if real else "")
     body = "vec3 a = wi, b = wo;\n"
     if coated:
         definitions["COATED"] = ""
         body = f"vec3 a = refracted(wi, {n}), b = refracted(wo, {n});\n"
-        early += f", {n}, wi.z, wo.z"
-    body += f"    begin_boundary({early});"
-    source = VERTEX.format(
-        functions=formulas(definitions), body=body, late="" if real else f"{text}, "
-    )
+    outside = f", {n}, wi.z, wo.z" if coated else ""
+    source = VERTEX.format(functions=formulas(definitions), body=body, index=text, outside=outside)
     program = gl.program(vertex_shader=source, varyings=["result"])
     heights = np.stack([given.kappa, given.variance], axis=1)
     data = np.concatenate([given.wi, given.wo, heights], axis=1).astype("f4")
@@ -70,7 +65,7 @@ shader probe(string Incident = "", string Outgoing = "", float Eta = 1.0, float 
     float kappa, variance;
     color wi = texture(Incident, P[0], P[1], "interp", "closest", "alpha", kappa);
     color wo = texture(Outgoing, P[0], P[1], "interp", "closest", "alpha", variance);
-    BSDF = emission() * boundary_factor(vector(wi), vector(wo), md_of(Eta, Kappa), kappa, variance);
+    BSDF = emission() * pair_power(vector(wi), vector(wo), md_of(Eta, Kappa), kappa, variance);
 }
 """
 _CODE = f"""{PLANE}

@@ -7,17 +7,16 @@ export_shader  write the shader of a surface for other programs (in `export`)
 scene          scenes as triangles with tangents, materials, lights and a camera
 packed_scene   all that shaders read of a scene, for the renderer and the page
 shader_materials  BSDFs, and the gloss of plain ones
-modelled       surfaces of `diffraction`: constants, energy conservation, tables
-solved         surfaces of `diffraction_orders`: efficiencies as a texture, lobes
+diffracting    surfaces that diffract: constants, energy conservation, tables, lobes
+solved         tables of solved orders: efficiencies as a texture, brightness of lobes
 lobes          directions drawn from lobes, and their densities
+features       features of surfaces that the shaders draw
 maps           textures of materials
-lanes          values of textures and emitters for many samples and wavelengths
 lights         directions, points, spots, and a smooth sky
 emitters       all emitters of a scene as a sequence of lights
 shadows        shadow maps, and the triangles that cast shadows
 surroundings   environments, flat lights and obstacles, which lobes look up
 bounces        light between surfaces on a grid
-progressive    accumulation of frames, each with one light or with looked-up surroundings
 camera         sensors as cameras
 packing        tables as textures
 texels         textures, uniforms and definitions that a shader reads; packing of numbers
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from .renderer import Renderer
 
 __all__ = [
-    "Renderer", "export", "export_shader", "methods", "packing", "scene", "shader_materials",
+    "Renderer", "export", "export_shader", "features", "methods", "packing", "scene",
     "texels",
 ]  # fmt: skip
 

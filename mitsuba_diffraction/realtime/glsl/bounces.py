@@ -14,7 +14,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ...arrays import Real
-from .lanes import uploaded
+from ...shading.spectra import uploaded, vectors_of
 from .scene import RealtimeScene
 from .texels import Packed, pack_grid
 
@@ -88,18 +88,19 @@ def _traced(scene: Any, origins: Real, rng: np.random.Generator, seed: int) -> l
     )
     away = points.spawn_ray(points.to_world(local))
     others, met = _met(scene, away, seen)
-    begin, along = _rows(away.o), _rows(away.d)
+    count = len(origins)
+    begin, along = vectors_of(away.o, count), vectors_of(away.d, count)
     active = np.concatenate([np.array(mask, bool).ravel() for mask in (seen, met)])
     radiance = _radiance(
         scene, np.concatenate([origins, begin]), np.concatenate([directions, along]), active, seed
     )
     first, second = np.split(radiance, 2)
     used, hit = np.split(active, 2)
-    places = _rows(points.p)[used]
+    places = vectors_of(points.p, count)[used]
     return [
         [(places, -directions[used], first[used]),
-         (_rows(others.p)[hit], -along[hit], second[hit])],
-        [(places, _rows(points.sh_frame.n)[used], second[used])],
+         (vectors_of(others.p, count)[hit], -along[hit], second[hit])],
+        [(places, vectors_of(points.sh_frame.n, count)[used], second[used])],
     ]  # fmt: skip
 
 
@@ -132,13 +133,8 @@ def _radiance(
     if mi.is_spectral:
         colour = mi.spectrum_to_srgb(colour, rays.wavelengths)
     known &= dr.isfinite(colour[0] + colour[1] + colour[2])
-    radiance = _rows(dr.select(known, mi.Color3f(colour), 0.0))
+    radiance = vectors_of(dr.select(known, mi.Color3f(colour), 0.0), len(origins))
     return np.clip(radiance, 0.0, _BRIGHTEST * max(float(radiance.mean()), 1e-30))
-
-
-def _rows(values: Any) -> Real:
-    """Read vectors (n, 3)."""
-    return np.array(values, np.float64).reshape(3, -1).T
 
 
 def _add(sums: Real, places: Real, axes: Real, radiance: Real) -> None:

@@ -124,7 +124,7 @@ class VertexBuffer(Resources):
 def enable_sides(context: Any, winding: int) -> None:
     """Draw with a depth test, and of closed surfaces only triangles that face the camera.
 
-    winding : as in `shadows.Solid`; 0 draws all triangles.
+    winding : as of `scene.winding_of`; 0 draws all triangles.
     """
     context.cull_face = "back" if winding > 0 else "front"
     context.enable_only(context.DEPTH_TEST | (context.CULL_FACE if winding else context.NOTHING))

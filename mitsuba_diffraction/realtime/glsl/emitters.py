@@ -64,17 +64,20 @@ class Emitters:
 
     def __init__(self, scene: Any, middle: Real) -> None:
         self.omissions: list[str] = []  # unsupported emitters, in a few words each
-        self._sequences: list[_LightSequence] = []
+        self._emitters: list[Any] = []
+        self._blocks: dict[tuple[int, int], list[Lamp]] = {}  # by emitter and number
         self._scene = scene  # keeps the shapes of area lights alive
         self._middle = middle
         self.environment = Environment.read(scene)
         irradiances = []
         for emitter in scene.emitters():
-            sequence = _LightSequence(emitter, middle, self.environment)
-            if not sequence.supported:
+            lights = self._block(emitter, 0)
+            # without cosines and cones
+            some = [float(light.irradiance(middle).sum()) for light in lights[:64]]
+            if not lights:
                 self.omissions.append(f"{name_of(emitter)} ({emitter.class_name()})")
-            elif (irradiance := sequence.irradiance()) > 0.0:
-                self._sequences.append(sequence)
+            elif (irradiance := np.maximum(some, 0.0).mean()) > 0.0:
+                self._emitters.append(emitter)
                 irradiances.append(irradiance)
         if not irradiances:
             raise DiffractionError(NO_LIGHT)
@@ -85,13 +88,15 @@ class Emitters:
     def lights(self) -> Iterator[Lamp]:
         """Yield lights without end; their mean converges to all direct light of the scene."""
         below = np.cumsum(self.probabilities)
-        drawn = [0] * len(self._sequences)
+        drawn = [0] * len(self._emitters)
         for block in itertools.count():
             places = (0.5 + np.arange(block * _BLOCK, (block + 1) * _BLOCK) * _GOLDEN) % 1.0
             choices = np.minimum(np.searchsorted(below, places, side="right"), len(drawn) - 1)
             lights = []
             for chosen in choices:
-                light = self._sequences[chosen].light(drawn[chosen])
+                number, inside = divmod(drawn[chosen], _BLOCK)
+                same = self._block(self._emitters[chosen], number)
+                light = same[inside % len(same)]
                 share = float(self.probabilities[chosen])
                 spectrum, density = light.spectrum / share, light.density * share
                 lights.append(replace(light, spectrum=spectrum, density=density))
@@ -104,8 +109,45 @@ class Emitters:
 
         The sun of a sky is excluded.
         """
-        shares = [s.looked_up() if s.emitter.ptr == emitter.ptr else 0.0 for s in self._sequences]
-        return float(self.probabilities @ np.array(shares))
+        found = 0.0
+        for share, each in zip(self.probabilities, self._emitters, strict=True):
+            if each.ptr == emitter.ptr:
+                found += share * np.mean([one.density != 0.0 for one in self._block(each, 0)])
+        return float(found)
+
+    def _block(self, emitter: Any, number: int) -> list[Lamp]:
+        """Return a block of an emitter's lights, one of one without extent, none of other kinds.
+
+        Lights are drawn by Mitsuba's sampling of the emitter.
+        """
+        if (emitter.ptr, number) in self._blocks:
+            return self._blocks[emitter.ptr, number]
+        start = number * _BLOCK
+        name, normals, address = name_of(emitter), np.zeros((_BLOCK, 3)), 0
+        if (fixed := without_extent(emitter, self._middle)) is not None:
+            return [fixed]
+        if emitter.class_name() == "AreaLight":
+            values, places, normals, waves = sampled_positions(emitter, _BLOCK, start)
+            points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
+            shape = emitter.get_shape()
+            densities = np.full(_BLOCK, 1.0 / area_of(shape) if is_flat(shape) else 0.0)
+            address = int(shape.ptr)
+        elif self.environment is not None and emitter.is_environment():
+            values, directions, _, waves = sampled_directions(
+                emitter, self._middle, _BLOCK, _FIRST + start
+            )
+            points = np.pad(directions, [(0, 0), (0, 1)])
+            of_sky = ~self.environment.in_sun(directions)
+            densities = of_sky * of_sky.mean() * self.environment.density(directions)
+        else:
+            return []
+        self._blocks[emitter.ptr, number] = [
+            Lamp(name, point, waves, value, normal, density=float(density), shape=address)
+            for point, value, normal, density in zip(
+                points, values, normals, densities, strict=True
+            )
+        ]
+        return self._blocks[emitter.ptr, number]
 
     def _features(self, light: Lamp) -> Real:
         """Return the light's irradiance in the middle by colour and spherical harmonics, (27,)."""
@@ -127,62 +169,6 @@ def _nearest_to_mean(features: Real) -> list[int]:
         total += features[chosen]
         order.append(chosen)
     return order
-
-
-class _LightSequence:
-    """Sequence of lights without extent that represents one emitter."""
-
-    def __init__(self, emitter: Any, middle: Real, environment: Environment | None) -> None:
-        self.emitter, self._middle, self._environment = emitter, middle, environment
-        self._fixed = without_extent(emitter, middle)
-        self._blocks: dict[int, list[Lamp]] = {}
-        self._area = emitter.class_name() == "AreaLight"
-        self.supported = self._area or self._fixed is not None or emitter.is_environment()
-
-    def looked_up(self) -> float:
-        """Return the share of lights that lobes look up, too."""
-        return float(np.mean([self.light(number).density != 0.0 for number in range(_BLOCK)]))
-
-    def light(self, number: int) -> Lamp:
-        """Return a light of the sequence by its number."""
-        if self._fixed is not None:
-            return self._fixed
-        block, inside = divmod(number, _BLOCK)
-        if block not in self._blocks:
-            self._blocks[block] = self._block(block * _BLOCK)
-        return self._blocks[block][inside]
-
-    def irradiance(self) -> float:
-        """Return the mean irradiance of the lights in the middle, without cosines and cones."""
-        lights = [self._fixed] if self._fixed is not None else [self.light(n) for n in range(64)]
-        irradiances = (float(light.irradiance(self._middle).sum()) for light in lights)
-        return float(np.mean([max(irradiance, 0.0) for irradiance in irradiances]))
-
-    def _block(self, start: int) -> list[Lamp]:
-        """Draw a block of lights from number `start` on, by Mitsuba's sampling of the emitter."""
-        name, normals, address = name_of(self.emitter), np.zeros((_BLOCK, 3)), 0
-        if self._area:
-            values, places, normals, waves = sampled_positions(self.emitter, _BLOCK, start)
-            points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
-            shape = self.emitter.get_shape()
-            densities = np.full(_BLOCK, 1.0 / area_of(shape) if is_flat(shape) else 0.0)
-            address = int(shape.ptr)
-        else:
-            assert self._environment is not None
-            values, directions, _, waves = sampled_directions(
-                self.emitter, self._middle, _BLOCK, _FIRST + start
-            )
-            points = np.pad(directions, [(0, 0), (0, 1)])
-            of_sky = ~self._environment.in_sun(directions)
-            densities = of_sky * of_sky.mean() * self._environment.density(directions)
-        return [
-            Lamp(
-                name, point, waves, value, normal, density=float(density), shape=address
-            )
-            for point, value, normal, density in zip(
-                points, values, normals, densities, strict=True
-            )
-        ]  # fmt: skip
 
 
 def emission(light: Lamp, direction: Real) -> float:

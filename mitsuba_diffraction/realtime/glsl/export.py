@@ -14,17 +14,13 @@ import numpy as np
 from ...atomic import atomic_path, make_folder
 from ...plugin.description import Consumer, Feature, Surface
 from ...tables import write_channels
+from .diffracting import pack_table, words_of
+from .features import GLSL
 from .maps import Map
-from .methods import check_methods, method_tables
+from .methods import check_methods
 from .packing import pack_responses
 from .rewriting import global_names, renamed, shader_file
-from .shader_materials import (
-    GLSL,
-    ShaderMaterial,
-    pack_conservation,
-    pack_surface,
-    packed_by,
-)
+from .shader_materials import ShaderMaterial, pack_surface
 from .source import method_files, part, surface_files
 from .texels import PAGE, Packed, Texture, four_channels, plain
 
@@ -130,15 +126,13 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     """
     described = SHADER.described(bsdf)
     check_methods(methods, EXPORTED)
-    surface = packed_by(described)
-    material = ShaderMaterial(Map(np.zeros(3)), surface)
-    common = pack_surface(material) | pack_conservation(material)
+    common = pack_surface(ShaderMaterial(Map(np.zeros(3)), described))
     constants = {"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "SURFACE_KIND": "0"}
     common |= Packed(definitions={**constants, **common.definitions})
-    tables = {method: method_tables(method, surface) for method in methods}
+    tables = {method: pack_table(described, method) for method in methods}
     if "exact" in tables:
         tables["exact"] |= pack_responses([(np.array([360.0, 830.0]), np.ones(2))])
-    return _joined(common, tables, described, surface.words)
+    return _joined(common, tables, described, words_of(described))
 
 
 def export_shader(

@@ -29,7 +29,7 @@ from ...optics.orders import (
 )
 from ...shading.dialects import GLSL
 from ...shading.orders import FORMULAS
-from ...shading.pair_power import Coat, relative_power
+from ...shading.pair_power import Coat, pair_power
 from ...shading.programs import Program
 
 #: Formulas of real numbers by the definition that needs them, with the numbers of parameters.
@@ -44,8 +44,6 @@ _REAL: dict[str, dict[Callable[..., Any], int]] = {
     "VCAVITY": {vcavity: 3},
     "ENERGY_CONSERVING": {horizon_attenuation: 1},
 }  # fmt: skip
-#: Macros of the shaders that a variable of a formula could be called.
-_MACROS = frozenset({"PI", "PAGE", "TEXELS"})
 _KINDS = {"1": "float", "2": "complex"}
 
 
@@ -61,7 +59,7 @@ def formulas(definitions: Mapping[str, str]) -> str:
 
 @functools.lru_cache(maxsize=64)
 def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> str:
-    program = Program(GLSL, _MACROS)
+    program = Program(GLSL)
     program.add(encoded_colour, "vector")
     if "DISPLAYED" in names:
         shown = shown_colour if "NATURAL" in names else encoded_colour
@@ -77,9 +75,7 @@ def _formulas(names: frozenset[str], index: str | None, model: Model | None) -> 
         program.add(beneath_reflectance, "float", "float", index)
     if index is not None and model is not None:
         coat = Coat("float", "float", "float") if "COATED" in names else None
-        program.add_staged(
-            relative_power, model.jones, "vector", "vector", index, "float", "float", coat,
-            late=("kappa", "variance") + (("index",) if index == "complex" else ()),
-            names=("begin_boundary", "boundary_factor"),
+        program.add(
+            pair_power, model.jones, "vector", "vector", index, "float", "float", coat,
         )  # fmt: skip
     return f"{program.text}\n"

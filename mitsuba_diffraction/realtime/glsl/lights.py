@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Real
-from ...optics.colour import daylight
+from ...optics.colour import daylight, daylight_shares
 from ...scene.elements import name_of
-from .lanes import Lanes
+from ...shading.spectra import spectra_of, uploaded, vectors_of
 from .packing import daylight_colour
 
 _WAVES = np.linspace(360.0, 830.0, 96)  # of spectra of light, nm
@@ -80,47 +81,48 @@ def read_lights(scene: Any, middle: Real, most: int) -> Lighting:
     most : largest number of lights; the weakest are left out.
     """
     lighting = Lighting()
+    lights, omissions = lighting.lights, lighting.omissions
     for emitter in scene.emitters():
-        _add(lighting, emitter, middle)
-    if len(lighting.lights) > most:
-        lighting.lights.sort(key=lambda light: -float(light.irradiance(middle).sum()))
-        names = ", ".join(light.name for light in lighting.lights[most:])
-        lighting.omissions.append(f"more than {most} lights ({names})")
-        del lighting.lights[most:]
+        kind, name = emitter.class_name(), name_of(emitter)
+        light = without_extent(emitter, middle)
+        if light is not None and light.cone is None:
+            lights.append(light)
+        elif kind == "AreaLight":
+            wavelengths, irradiance, direction, distance = _mean_sample(emitter, middle, _SAMPLES)
+            place = np.append(middle + direction * distance, 1.0)
+            lights.append(Lamp(name, place, wavelengths, irradiance * distance**2))
+            omissions.append(f"the extent of {name} (area light, shown as a point)")
+        elif emitter.is_environment():
+            sun = sun_of(emitter)
+            if sun.any():
+                wavelengths, irradiance, *_ = _mean_sample(emitter, middle, 4 * _SAMPLES, sun)
+                if irradiance.any():
+                    place = np.append(sun, 0.0)
+                    lights.append(Lamp(f"sun of {name}", place, wavelengths, irradiance))
+                omissions.append(
+                    f"the sun's disc and the sky of {name} (a direction, and a smooth sky)"
+                )
+            elif kind == "EnvironmentMapEmitter":
+                omissions.append(f"the picture of {name} (environment, shown as a smooth one)")
+            lighting.sky = lighting.sky + _sky(emitter, middle, sun)
+        else:
+            omissions.append(f"{name} ({kind})")
+    if len(lights) > most:
+        lights.sort(key=lambda light: -float(light.irradiance(middle).sum()))
+        names = ", ".join(light.name for light in lights[most:])
+        omissions.append(f"more than {most} lights ({names})")
+        del lights[most:]
     return lighting
 
 
-def _add(lighting: Lighting, emitter: Any, middle: Real) -> None:
-    """Add the lights, sky or omission of an emitter."""
+def sun_of(emitter: Any) -> Real:
+    """Return the direction (3,) towards the sun of a sky; zeros for other emitters."""
     import mitsuba as mi
 
-    kind, parameters = emitter.class_name(), mi.traverse(emitter)
-    name = name_of(emitter)
-    light = without_extent(emitter, middle)
-    if light is not None and light.cone is None:
-        lighting.lights.append(light)
-    elif kind == "AreaLight":
-        wavelengths, irradiance, direction, distance = _mean_sample(emitter, middle, _SAMPLES)
-        place = np.append(middle + direction * distance, 1.0)
-        lighting.lights.append(Lamp(name, place, wavelengths, irradiance * distance**2))
-        lighting.omissions.append(f"the extent of {name} (area light, shown as a point)")
-    elif kind == "ConstantBackgroundEmitter":
-        lighting.sky = lighting.sky + _sky(emitter, middle)
-    elif "sun_direction" in parameters:
-        sun = np.array(parameters["sun_direction"], float).ravel()
-        wavelengths, irradiance, *_ = _mean_sample(emitter, middle, 4 * _SAMPLES, sun)
-        if irradiance.any():
-            place = np.append(sun, 0.0)
-            lighting.lights.append(Lamp(f"sun of {name}", place, wavelengths, irradiance))
-        lighting.sky = lighting.sky + _sky(emitter, middle, sun)
-        lighting.omissions.append(
-            f"the sun's disc and the sky of {name} (a direction, and a smooth sky)"
-        )
-    elif kind == "EnvironmentMapEmitter":
-        lighting.sky = lighting.sky + _sky(emitter, middle)
-        lighting.omissions.append(f"the picture of {name} (environment, shown as a smooth one)")
-    else:
-        lighting.omissions.append(f"{name} ({kind})")
+    parameters = mi.traverse(emitter)
+    if "sun_direction" not in parameters:
+        return np.zeros(3)
+    return np.array(parameters["sun_direction"], float).ravel()
 
 
 def without_extent(emitter: Any, middle: Real) -> Lamp | None:
@@ -164,15 +166,17 @@ def _mean_sample(
     return wavelengths, values.mean(axis=0), direction, float(share @ distances)
 
 
-def _sky(emitter: Any, point: Real, sun: Real | None = None) -> Real:
+def _sky(emitter: Any, point: Real, sun: Real) -> Real:
     """Return `Lighting.sky` of one emitter without its sun: spherical harmonics up to order 1.
+
+    sun : direction towards the sun, or zeros.
 
     With L = Σ L_lm Y_lm the irradiance is Σ A_l L_lm Y_lm(n), A_0 = π, A_1 = 2π/3 (Ramamoorthi and
     Hanrahan 2001), so E/π = ∫L dω/4π + n·∫L ω dω/2π. This is exact for a constant sky over one
     half, which has no further even orders; odd orders beyond 1 do not contribute.
     """
     values, directions, _, wavelengths = sampled_directions(emitter, point, _SAMPLES)
-    included = np.ones(len(values)) if sun is None else directions @ sun <= np.cos(AROUND_SUN)
+    included = directions @ sun <= np.cos(AROUND_SUN)
     factors = np.column_stack(
         [included / (4.0 * np.pi), included[:, None] * directions / (2.0 * np.pi)]
     )
@@ -192,14 +196,17 @@ def sampled_directions(
     """
     import mitsuba as mi
 
-    lanes = Lanes(samples, _WAVES)
-    si = lanes.interaction()
-    si.p = mi.Point3f(*(mi.Float(float(x)) for x in point))
-    sample, weight = emitter.sample_direction(si, _points(lanes, start))
-    directions = lanes.vectors(sample.d)
-    distances = np.broadcast_to(np.array(sample.dist, np.float64).ravel(), (lanes.count,))
-    values, wavelengths = _relative(lanes, weight)
-    return values, directions, distances[:: lanes.quads], wavelengths
+    places, drawn = _points(samples, start), list[Any]()
+
+    def draw(si: Any) -> Any:
+        si.p = mi.Point3f(*(mi.Float(float(x)) for x in point))
+        sample, weight = emitter.sample_direction(si, places)
+        drawn.append(sample)
+        return weight
+
+    values, wavelengths = _relative(spectra_of(draw, _WAVES, samples))
+    distances = np.broadcast_to(np.array(drawn[0].dist, np.float64).ravel(), (samples,))
+    return values, vectors_of(drawn[0].d, samples), distances, wavelengths
 
 
 def sampled_positions(emitter: Any, samples: int, start: int = 0) -> tuple[Real, Real, Real, Real]:
@@ -210,44 +217,49 @@ def sampled_positions(emitter: Any, samples: int, start: int = 0) -> tuple[Real,
     """
     import mitsuba as mi
 
-    lanes = Lanes(samples, _WAVES)
-    sample, weight = emitter.sample_position(0.0, _points(lanes, start))
-    si = lanes.interaction()
-    si.p, si.n, si.uv = sample.p, sample.n, sample.uv
-    si.wi = mi.Vector3f(0.0, 0.0, 1.0)
-    values, wavelengths = _relative(lanes, emitter.eval(si) * weight)
-    return values, lanes.vectors(sample.p), lanes.vectors(sample.n), wavelengths
+    sample, weight = emitter.sample_position(0.0, _points(samples, start))
+
+    def leaving(si: Any) -> Any:
+        si.p, si.n, si.uv = sample.p, sample.n, sample.uv
+        si.wi = mi.Vector3f(0.0, 0.0, 1.0)
+        return emitter.eval(si) * weight
+
+    values, wavelengths = _relative(spectra_of(leaving, _WAVES, samples))
+    return values, vectors_of(sample.p, samples), vectors_of(sample.n, samples), wavelengths
 
 
 def radiance_along(emitter: Any, directions: Real) -> Real:
     """Return the radiance of an environment from directions (n, 3), linear sRGB (n, 3)."""
     import mitsuba as mi
 
-    lanes = Lanes(len(directions), _WAVES)
-    si = lanes.interaction()
-    si.wi = mi.Vector3f(*lanes.uploaded(-directions))
-    values, waves = _relative(lanes, emitter.eval(si))
+    back = mi.Vector3f(*uploaded(-directions))
+
+    def arriving(si: Any) -> Any:
+        si.wi = back
+        return emitter.eval(si)
+
+    values, waves = _relative(spectra_of(arriving, _WAVES, len(directions)))
     if values.ndim == 3:
         return values[:, 0]
-    return values @ np.array([daylight_colour(waves, row) for row in np.eye(len(waves))])
+    return values @ daylight_shares(waves)
 
 
-def _points(lanes: Lanes, start: int) -> Any:
+def _points(samples: int, start: int) -> Any:
     """Return points of the plastic number's sequence in the unit square (Roberts 2018)."""
     import mitsuba as mi
 
-    number = np.arange(start, start + lanes.samples)[:, None]
-    return mi.Point2f(*lanes.uploaded((0.5 + number * [0.7548776662, 0.5698402910]) % 1.0))
+    number = np.arange(start, start + samples)[:, None]
+    return mi.Point2f(*uploaded((0.5 + number * [0.7548776662, 0.5698402910]) % 1.0))
 
 
-def _relative(lanes: Lanes, values: Any) -> tuple[Real, Real]:
-    """Read values as of `sampled_directions`, and the wavelengths."""
+def _relative(spectra: NDArray[np.float32]) -> tuple[Real, Real]:
+    """Return values as of `sampled_directions` from spectra over `_WAVES`, and the wavelengths."""
     import mitsuba as mi
 
-    spectra = lanes.spectra(mi.unpolarized_spectrum(values)).astype(np.float64)
+    values = spectra.astype(np.float64)
     if not mi.is_spectral:
-        return np.repeat(spectra[:, None], 2, axis=1), np.array([360.0, 830.0])
-    return spectra / daylight(lanes.wavelengths), lanes.wavelengths
+        return np.repeat(values[:, None], 2, axis=1), np.array([360.0, 830.0])
+    return values / daylight(_WAVES), _WAVES
 
 
 def area_of(shape: Any) -> float:

@@ -15,7 +15,7 @@ from ...errors import DiffractionError
 from ...plugin.description import Mix, Surface
 from ...plugin.parameter_changes import children
 from ...scene.elements import attribute_of
-from .lanes import evaluated, uploaded
+from ...shading.spectra import evaluated, uploaded
 from .packing import colour_weights
 
 #: Wavelengths (n,) in nm, and values (n,).
@@ -62,12 +62,13 @@ class Map:
 def raw_picture(bsdf: Any, name: str, channels: int, scale: float, shift: float = 0.0) -> Map:
     """Return the values of a wrapper's raw texture of one or three channels, scaled and shifted."""
     texture = children(bsdf)[name]
-    width, height = (int(n) for n in texture.resolution())
-    uv, to_uv = _centres(texture, width, height)
-    si = _interaction(uv)
-    value = texture.eval_1(si) if channels == 1 else texture.eval_3(si)
-    pixels = np.array(value, np.float32).reshape(channels, height, width)
-    return Map(np.zeros(channels), scale * pixels.transpose(1, 2, 0) + shift, to_uv)
+
+    def look_up(uv: Real) -> NDArray[np.floating]:
+        si = _interaction(uv)
+        value = texture.eval_1(si) if channels == 1 else texture.eval_3(si)
+        return scale * np.array(value, np.float32).reshape(channels, -1).T + shift
+
+    return _picture([texture], look_up, name)
 
 
 def colour_map(texture: Any, light: Spectrum) -> Map:
@@ -76,11 +77,7 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
         return Map(np.ones(3), attribute=attribute)
     import mitsuba as mi
 
-    width, height = (int(n) for n in texture.resolution())
-    if texture.class_name() == "Checkerboard":
-        width = height = _CHEQUERS  # fine, since filtering blurs edges by a texel
-    elif width * height <= 1:
-        width = height = 1
+    width, height = _size(texture)
     uv, to_uv = _centres(texture, width, height)
     colours = _lit(texture, uv, light) if mi.is_spectral else evaluated(texture, uv, np.zeros(3))
     if width * height == 1:
@@ -151,7 +148,9 @@ def interval_maps(mix: Mix) -> list[Map]:
     return [replace(whole, picture=whole.picture[..., n : n + 2]) for n in range(len(mix.parts))]
 
 
-def _picture(textures: Sequence[Any], look_up: Callable[[Real], Real], name: str) -> Map:
+def _picture(
+    textures: Sequence[Any], look_up: Callable[[Real], NDArray[np.floating]], name: str
+) -> Map:
     """Evaluate a function of textures at the texels of the largest one."""
     sizes, transforms = [], []
     for texture in textures:
@@ -160,10 +159,7 @@ def _picture(textures: Sequence[Any], look_up: Callable[[Real], Real], name: str
                 f"{name}: a mesh attribute is not supported by the shaders; use textures, or "
                 "render the scene with Mitsuba"
             )
-        width, height = (int(n) for n in texture.resolution())
-        if texture.class_name() == "Checkerboard":
-            width = height = _CHEQUERS
-        sizes.append((width, height))
+        sizes.append(_size(texture))
         transforms.append(_centres(texture, 1, 1)[1])
     (width, height), to_uv = max(zip(sizes, transforms, strict=True), key=lambda pair: pair[0])
     if any(size != (1, 1) and not np.allclose(other, to_uv)
@@ -175,10 +171,18 @@ def _picture(textures: Sequence[Any], look_up: Callable[[Real], Real], name: str
     uv, _ = _centres(textures[sizes.index((width, height))], width, height)
     values = look_up(uv)
     aside = np.linalg.inv(to_uv)[:2, :2] @ np.array([0.3 / width, 0.3 / height])
-    return Map(
-        values[0], values.reshape(height, width, -1), to_uv, clamped=_clamps(look_up, to_uv),
-        nearest=bool(np.allclose(look_up(uv + aside), values)),
-    )  # fmt: skip
+    first, clamped = values[0].astype(float), _clamps(look_up, to_uv)
+    nearest = bool(np.allclose(look_up(uv + aside), values))
+    picture = values.reshape(height, width, -1)
+    return Map(first, picture, to_uv, clamped=clamped, nearest=nearest)
+
+
+def _size(texture: Any) -> tuple[int, int]:
+    """Return the width and height of a picture that shows a texture, texels."""
+    if texture.class_name() == "Checkerboard":
+        return _CHEQUERS, _CHEQUERS  # fine, since filtering blurs edges by a texel
+    width, height = (max(int(n), 1) for n in texture.resolution())
+    return width, height
 
 
 def _clamps(look_up: Callable[[Real], NDArray[np.floating]], to_uv: Real) -> bool:

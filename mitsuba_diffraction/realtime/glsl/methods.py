@@ -11,7 +11,6 @@ from .texels import Packed
 
 if TYPE_CHECKING:
     from ...plugin.description import Consumer, Surface
-    from .shader_materials import Diffracting
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class ShaderMethod:
 
 def _exact() -> Consumer:
     from ...plugin.description import Consumer, Feature
-    from .shader_materials import GLSL
+    from .features import GLSL
 
     return Consumer("method exact", GLSL.shows - {Feature.PATCH}, "use method fast")
 
@@ -79,15 +78,3 @@ def refusal(name: str, described: Surface) -> str | None:
     """Return why a method cannot draw a surface that the renderer can, or None."""
     consumer = method_of(name).consumer
     return None if consumer is None else consumer().refusal(described)
-
-
-def method_tables(name: str, surface: Diffracting) -> Packed:
-    """Pack a surface's table for a method.
-
-    Raises a DiffractionError if the method is unknown, or does not support the table.
-    """
-    described = surface.described
-    if reason := refusal(name, described):
-        raise DiffractionError(reason)
-    pack = METHODS[name].tables
-    return surface.tables(name) if pack is None or described.heights is None else pack(described)

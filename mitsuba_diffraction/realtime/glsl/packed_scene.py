@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...plugin.description import Surface
 from .bounces import pack_bounces
+from .diffracting import height_room, lobes_of, pack_table
 from .emitters import Emitters
-from .methods import method_tables
 from .scene import RealtimeScene, SceneSurface, load, read_scene
-from .shader_materials import Diffracting, pack_conservation, pack_emission, pack_surface
+from .shader_materials import pack_emission, pack_surface
 from .surroundings import flat_shapes, pack_flats, pack_obstacles
 from .texels import Packed
 
@@ -55,20 +56,18 @@ class PackedScene:
     def __init__(self, scene: Any, sensor: int = 0, octaves: Sequence[float] = (0.0,)) -> None:
         self.mitsuba_scene = load(scene)
         self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
-        tables: dict[int, Diffracting] = {}
+        tables: dict[int, Surface] = {}
         for surface in self.scene.diffracting:
-            tables.setdefault(id(surface.described.table), surface)
+            tables.setdefault(id(surface.table), surface)
         self.diffracting = tuple(tables.values())
         numbers = {key: number for number, key in enumerate(tables)}
-        room = min(surface.height_room for surface in self.scene.diffracting)
+        room = min(map(height_room, self.scene.diffracting))
         self.octaves = tuple(n for n in octaves if 2.0**n <= max(room, 1.0))
         heights = [2.0**n for n in self.octaves]
         self.surfaces = tuple(
             PackedSurface(
                 surface,
-                pack_surface(surface.material)
-                | pack_conservation(surface.material, heights)
-                | pack_emission(surface.radiance),
+                pack_surface(surface.material, heights) | pack_emission(surface.radiance),
                 numbers.get(id(surface.table)),
             )
             for surface in self.scene.surfaces
@@ -81,13 +80,13 @@ class PackedScene:
         Raises a DiffractionError if the method is unknown, or does not support a table.
         """
         if method not in self._tables:
-            self._tables[method] = [method_tables(method, one) for one in self.diffracting]
+            self._tables[method] = [pack_table(one, method) for one in self.diffracting]
         return self._tables[method]
 
     @cached_property
     def lobes(self) -> list[Packed]:
         """Directions drawn from the lobes of each table, and their densities."""
-        return [surface.lobes() for surface in self.diffracting]
+        return [lobes_of(described) for described in self.diffracting]
 
     @cached_property
     def emitters(self) -> Emitters | None:

@@ -1,22 +1,34 @@
-"""Realtime renderer of Mitsuba scenes by shaders, without a window."""
+"""Realtime renderer of Mitsuba scenes by shaders, without a window.
+
+Light of all emitters with soft shadows is accumulated over frames, of which two kinds alternate.
+The first draws one light with its shadows (`emitters`, `shadows`). The second looks up the
+surroundings along each pixel's lobes (`surroundings`), and draws the background and emitted light.
+The balance heuristic weights the two. Every frame samples another point of each pixel and of the
+lens, so that edges become smooth with the light. On request, frames of the second kind add light
+that surfaces send to each other (`bounces`).
+"""
 
 from __future__ import annotations
 
-import functools
+import itertools
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import warn
+from ...errors import DiffractionError, warn
 from ...system import cores
 from .camera import Camera
 from .context import (
     Bindings,
     Resources,
+    ShaderPass,
     Target,
     VertexBuffer,
     check_version,
@@ -25,15 +37,23 @@ from .context import (
     headless_context,
     set_uniforms,
 )
+from .emitters import NO_LIGHT
 from .lights import Lamp
 from .packed_scene import PackedScene
 from .packing import pack_responses
-from .progressive import ProgressiveLight, Stage
-from .shadows import SIZE
+from .shadows import SIZE, ShadowMap
 from .source import LIGHTS, fragment_parts
 from .texels import Packed, Uniform
 
 Image = NDArray[np.float32]
+# steps of two numbers each for the pixel, the lens, the shadow map and the lobes: fractional parts
+# of multiples of square roots of primes are independent (Richtmyer 1951); multiples of the golden
+# ratio, (1 + √5)/2, are the most even, which matters most for lobes
+_STEPS = np.append(np.sqrt([2.0, 3.0, 7.0, 11.0, 13.0, 17.0]), [0.5 + 1.25**0.5, 19.0**0.5]) % 1.0
+
+#: Lamp of frames that look up the surroundings: spectra of daylight, to be multiplied by colours.
+_WHITE = Lamp("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
+
 _SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
 
 
@@ -73,9 +93,6 @@ class Renderer(Resources):
         self._tables: dict[str, list[Bindings]] = {}
         self._programs: dict[object, Any] = {}
         self._arrays: dict[object, Any] = {}
-        self._responses: Bindings | None = None
-        self._stage: Stage | None = None  # emitters and surroundings, built at their first use
-        self._spectra: list[NDArray[np.float64]] = []
 
     def _warn(self, omissions: Sequence[str]) -> None:
         """Warn of unsupported parts of the scene."""
@@ -145,10 +162,9 @@ class Renderer(Resources):
         uniforms: dict[str, Uniform] = {
             "sky": np.asarray(self.sky, np.float32), "surroundings_lit": (1.0, 1.0),
         }  # fmt: skip
-        bindings = Bindings(self.context, Packed((), uniforms, definitions))
-        frame.use()
-        frame.clear(0.0, 0.0, 0.0, 0.0)
-        self.draw_lights(method, frame, camera or self.camera, self.lights, bindings)
+        frame.clear()
+        packed = Packed((), uniforms, definitions)
+        self.draw_lights(method, frame, camera or self.camera, self.lights, packed)
 
     def progressive(
         self,
@@ -175,35 +191,23 @@ class Renderer(Resources):
             `lights`.
         """
         camera = camera or self.camera
-        resized = camera.resized(*(size or camera.size))
-        self._stage = self._stage or self.own(Stage(self.context, self.packed, self.buffers))
-        draw = functools.partial(self.draw_lights, method)
         return ProgressiveLight(
-            self._stage, draw, resized, lights=lights, shadow_size=shadow_size, bounces=bounces
+            self, method, camera.resized(*(size or camera.size)), lights, shadow_size, bounces
         )
 
     def draw_lights(
-        self,
-        method: str,
-        frame: Any,
-        camera: Camera,
-        lights: Sequence[Lamp],
-        bindings: Bindings,
-        extras: Sequence[Sequence[Bindings]] = (),
-        windings: Sequence[int] = (),
-    ) -> None:
+        self, method: str, frame: Any, camera: Camera, lights: Sequence[Lamp], packed: Packed,
+        shared: Sequence[Bindings] = (),
+    ) -> None:  # fmt: skip
         """Draw some lights, or looked-up surroundings, into a framebuffer.
 
         Parameters
         ----------
         method, frame, camera : as in `draw`.
         lights : lights without extent.
-        bindings : of the light; they get the uniforms of the camera and of the lights.
-        extras : further bindings of each surface.
-        windings : of each surface whose triangles that face away are hidden; 0 for others.
+        packed : further uniforms and definitions of the light.
+        shared : further parts of all surfaces.
         """
-        tables = self.tables(method)
-        frame.use()
         matrix = camera.view_projection(self.scene.low, self.scene.high)
         places = np.zeros((LIGHTS, 4), np.float32)
         colours = np.zeros((LIGHTS, 3), np.float32)
@@ -212,29 +216,28 @@ class Renderer(Resources):
             if place[3] == 0.0:
                 place[:3] /= np.linalg.norm(place[:3])
             places[n], colours[n] = place, light.colour
-        bindings.uniforms |= {
+        uniforms: dict[str, Uniform] = {
             "view_projection": tuple(matrix.T.ravel().tolist()),
             "eye": tuple(camera.eye.tolist()),
             "light_place": places,
             "light_colour": colours,
         }
+        responses = pack_responses([(light.wavelengths, light.spectrum) for light in lights])
+        of_light = Bindings(self.context, packed | Packed((), uniforms) | responses)
+        parts_of = [self.bindings, self.tables(method)]
+        if {"WEIGHTED", "LOOKED_UP"} & set(packed.definitions):
+            parts_of.append(self.lobes)
+        frame.use()
         for n, surface in enumerate(self.scene.surfaces):
-            parts = (bindings, self.bindings[n], tables[n], *(extras[n] if extras else ()))
-            program = self.program(method, parts)
-            self.bind(program, parts, lights)
+            program = self.bound(method, (of_light, *shared, *(parts[n] for parts in parts_of)))
             if "pigment_in_light" in program:
                 matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
                 set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
-            enable_sides(self.context, windings[n] if windings else 0)
             if (n, id(program)) not in self._arrays:
                 self._arrays[n, id(program)] = self.own(self.buffers[n].array(program))
+            enable_sides(self.context, surface.winding_from(np.append(camera.eye, 1.0)))
             self._arrays[n, id(program)].render()
-
-    def release(self) -> None:
-        """Free the graphics card's memory."""
-        if self._responses is not None:
-            self._responses.release()
-        super().release()
+        of_light.release()
 
     def tables(self, method: str) -> list[Bindings]:
         """Return a method's table of each surface, uploaded at the first call; empty without one.
@@ -242,14 +245,31 @@ class Renderer(Resources):
         Raises a DiffractionError if the method is unknown, or does not support a table.
         """
         if method not in self._tables:
-            tables = (*self.packed.tables(method), Packed())
-            bound = [self.own(Bindings(self.context, packed)) for packed in tables]
-            numbers = (-1 if s.table is None else s.table for s in self.packed.surfaces)
-            self._tables[method] = [bound[number] for number in numbers]
+            self._tables[method] = self._by_surface(self.packed.tables(method))
         return self._tables[method]
 
-    def program(self, method: str, parts: Sequence[Bindings]) -> Any:
-        """Return the program of a surface, which is cached.
+    @cached_property
+    def lobes(self) -> list[Bindings]:
+        """Directions drawn from the lobes of each surface; empty of one without a table."""
+        return self._by_surface(self.packed.lobes)
+
+    def _by_surface(self, of_tables: Sequence[Packed]) -> list[Bindings]:
+        """Upload a part of each table, and return the part of each surface's table."""
+        bound = [self.own(Bindings(self.context, packed)) for packed in (*of_tables, Packed())]
+        return [bound[-1 if s.table is None else s.table] for s in self.packed.surfaces]
+
+    @cached_property
+    def around(self) -> Bindings:
+        """All that lobes look up of direct light (`PackedScene.around`)."""
+        return self.own(Bindings(self.context, self.packed.around))
+
+    @cached_property
+    def bounces(self) -> Bindings:
+        """Light between surfaces."""
+        return self.own(Bindings(self.context, self.packed.bounces))
+
+    def bound(self, method: str, parts: Sequence[Bindings]) -> Any:
+        """Return the program of a surface, which is cached, with its parts bound.
 
         parts : of the light, the surface, its table and its surroundings.
 
@@ -263,28 +283,111 @@ class Renderer(Resources):
             stage = fragment_parts(method, definitions)
             program = compile_program(self.context, f"method {method}", stage)
             self._programs[key] = self.own(program)
-        return self._programs[key]
-
-    def bind(self, program: Any, parts: Sequence[Bindings], lights: Sequence[Lamp]) -> None:
-        """Bind the parts of a surface in its program, and the lights' spectra.
-
-        The spectra are uploaded if the lights have changed.
-        """
         unit = 0
         for part in parts:
-            unit = part.use(program, unit)
-        if "responses" not in program:
-            return
-        pairs = [(light.wavelengths, light.spectrum) for light in lights]
-        spectra = [spectrum for _, spectrum in pairs]
-        same = list(map(id, spectra)) == list(map(id, self._spectra))
-        if self._responses is None or not same:
-            if self._responses is not None:
-                self._responses.release()
-            self._responses = Bindings(self.context, pack_responses(pairs))
-            self._spectra = spectra
-        self._responses.use(program, unit)
+            unit = part.use(self._programs[key], unit)
+        return self._programs[key]
 
     def target(self, width: int, height: int) -> Target:
         """Return a new framebuffer, which the caller releases."""
         return Target(self.context, width, height)
+
+
+class ProgressiveLight(Resources):
+    """Picture that accumulates frames, created by `Renderer.progressive`.
+
+    lights : lights to draw instead of the scene's emitters and surroundings.
+    shadow_size : texels a side of a shadow map.
+    bounces : whether light between surfaces is added to light from the emitters.
+
+    Raises a DiffractionError if no emitter lights the scene, or the environment is not finite.
+    """
+
+    def __init__(
+        self, renderer: Renderer, method: str, camera: Camera, lights: Sequence[Lamp],
+        shadow_size: int, bounces: bool,
+    ) -> None:  # fmt: skip
+        self._renderer, self._method, self._camera = renderer, method, camera
+        packed, context = renderer.packed, renderer.context
+        if packed.emitters is None:
+            raise DiffractionError(NO_LIGHT)
+        self._emitters = packed.emitters
+        self._fixed = [replace(light, spectrum=len(lights) * light.spectrum) for light in lights]
+        bounces = bounces and not lights
+        self._looks_up = (packed.looks_up or bounces) and not lights
+        self._around = [renderer.around, *([renderer.bounces] if bounces else [])]
+        self._map = self.own(
+            ShadowMap(context, packed.scene, renderer.buffers, camera, shadow_size)
+        )
+        # a frame, and the sum of each kind of frames
+        self._frame, *self._sums = (self.own(Target(context, *camera.size)) for _ in range(3))
+        self.restart()
+        self._add = self.own(ShaderPass(context, "add.frag"))
+        self._background: ShaderPass | None = None
+        if self._emitters.environment is not None:
+            files = ("library.glsl", "surroundings.glsl", "background.frag")
+            shown = ShaderPass(context, *files, **renderer.around.definitions)
+            self._background = self.own(shown)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames in the picture."""
+        return sum(self._counts)
+
+    def restart(self) -> None:
+        """Start again."""
+        for target in self._sums:
+            target.frame.clear(0.0, 0.0, 0.0, 0.0)
+        self._counts = [0, 0]
+        self._drawn: Counter[tuple[str, bool]] = Counter()  # number of frames of each emitter
+        self._lights: Iterator[Lamp] = (
+            itertools.cycle(self._fixed) if self._fixed else self._emitters.lights()
+        )
+
+    def advance(self, frames: int = 1) -> None:
+        """Add this many frames."""
+        for _ in range(frames):
+            kind = self.frames % 2 if self._looks_up else 0
+            light = next(self._lights) if kind == 0 else _WHITE
+            # one sequence per emitter, for a sky and its sun, too: random points would cause glints
+            emitter = light.name, light.density != 0.0
+            self._drawn[emitter] += 1
+            numbers = (0.5 + self._drawn[emitter] * _STEPS) % 1.0
+            camera = self._camera.sampled(numbers[:2] - 0.5, numbers[2:4])
+            self._draw_behind(camera, bright=kind == 1)
+            if kind == 0:
+                marks = ("PIGMENT_IN_LIGHT", *(["WEIGHTED"] if self._looks_up else []))
+                packed = Packed((), {"light_density": light.density}, dict.fromkeys(marks, ""))
+                shared = [self._map.draw(light, numbers[4:6]), *self._around]
+            else:
+                drawn = {"sequence": tuple(numbers[6:8].tolist()), "surroundings_lit": (1.0, 1.0)}
+                packed, shared = Packed((), drawn, {"LOOKED_UP": ""}), self._around
+            frame = self._frame.frame
+            self._renderer.draw_lights(self._method, frame, camera, [light], packed, shared)
+            self._sums[kind].frame.use()
+            blended: dict[str, Uniform] = {"first": True, "covers": 1.0}
+            self._add.draw(blended, {"frame": self._frame.colour}, adding=True)
+            self._counts[kind] += 1
+
+    def _draw_behind(self, camera: Camera, bright: bool) -> None:
+        """Clear the frame and, if `bright`, draw the background."""
+        self._frame.frame.use()
+        self._frame.frame.clear(0.0, 0.0, 0.0, 0.0)
+        if bright and self._background is not None:
+            scene, around = self._renderer.scene, self._renderer.around
+            from_clip = np.linalg.inv(camera.view_projection(scene.low, scene.high))
+            uniforms: dict[str, Uniform] = {
+                **around.uniforms,
+                "from_clip": tuple(from_clip.T.ravel().tolist()),
+                "eye": tuple(camera.eye.tolist()),
+                "picture_size": tuple(float(n) for n in camera.size),
+            }
+            self._background.draw(uniforms, around.textures)
+
+    @property
+    def image(self) -> NDArray[np.float32]:
+        """Picture so far (height, width, 4): linear sRGB, and the coverage of each pixel."""
+        sums = zip(self._sums, self._counts, strict=True)
+        total = np.sum([target.read() / np.float32(max(count, 1)) for target, count in sums], 0)
+        total[..., 3] /= np.float32(max(sum(count > 0 for count in self._counts), 1))
+        return np.asarray(total, np.float32)

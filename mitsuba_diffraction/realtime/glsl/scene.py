@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +14,20 @@ from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...errors import DiffractionError
+from ...plugin.description import Surface
 from ...scene.elements import check_attributes, has_texcoords, name_of
 from ...scene.orientation.mesh_files import mesh_arrays
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
+from ...shading.spectra import uploaded
 from .camera import Camera, read_camera
-from .lanes import uploaded
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
-from .shader_materials import Diffracting, ShaderMaterial, diffracts, read_materials
+from .shader_materials import ShaderMaterial, diffracts, read_materials
 from .source import LIGHTS
 
 _RINGS, _SEGMENTS = 192, 384  # triangles of a sphere lie within 3e-5 of its radius
+_SAME = 1e-6  # distance of points that are equal, relative to the extent of a surface
+_BITS = 21  # bits of a coordinate in units of that distance
 
 #: Attributes of a vertex and their number of components.
 VERTEX = (
@@ -180,7 +184,40 @@ class SceneSurface:
     def table(self) -> Any:
         """Table of heights or of solved orders; None where nothing diffracts."""
         diffraction = self.material.diffraction
-        return None if diffraction is None else diffraction.described.table
+        return None if diffraction is None else diffraction.table
+
+    @cached_property
+    def _solid(self) -> tuple[Real, Real, int]:
+        """Corners of a box around the surface, and the winding of a closed one, else 0."""
+        corners = self.vertices[:, :3].reshape(-1, 3, 3).astype(np.float64)
+        return *box_of([self.vertices[:, :3]]), winding_of(corners)
+
+    def winding_from(self, place: Real) -> int:
+        """Return the winding of a surface that is closed and seen from outside, else 0.
+
+        place : (4,) position and 1, or direction and 0.
+        """
+        low, high, winding = self._solid
+        inside = (place[:3] >= low) & (place[:3] <= high)
+        return 0 if place[3] and inside.all() else winding
+
+
+def winding_of(triangles: Real) -> int:
+    """Return 1 of closed triangles (n, 3, 3), counter-clockwise from outside, −1 clockwise, else 0.
+
+    Closed triangles traverse each edge equally often in both directions.
+    """
+    low = triangles.min(axis=(0, 1))
+    step = max(float(np.ptp(triangles, axis=(0, 1)).max()), 1e-30) * _SAME
+    x, y, z = np.rint((triangles - low) / step).astype(np.int64).transpose(2, 0, 1)
+    corner = np.unique((x << _BITS | y) << _BITS | z, return_inverse=True)[1].reshape(-1, 3)
+    start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
+    start, end = start[start != end], end[start != end]
+    count = int(corner.max()) + 1
+    if not np.array_equal(np.sort(start * count + end), np.sort(end * count + start)):
+        return 0
+    a, b, c = (triangles - triangles.mean(axis=(0, 1))).transpose(1, 0, 2)
+    return int(np.sign(np.einsum("ni,ni->", a, np.cross(b, c))))
 
 
 @dataclass(frozen=True)
@@ -196,8 +233,8 @@ class RealtimeScene:
     of_light: tuple[str, ...] = ()  # omissions that progressive light does support
 
     @property
-    def diffracting(self) -> tuple[Diffracting, ...]:
-        """Materials that diffract, of all surfaces."""
+    def diffracting(self) -> tuple[Surface, ...]:
+        """Descriptions of all surfaces that diffract."""
         all_surfaces = (surface.material.diffraction for surface in self.surfaces)
         return tuple(surface for surface in all_surfaces if surface is not None)
 

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from ...arrays import Real
 from ...errors import DiffractionError
-from ...plugin.description import Consumer, Feature, Mix, Surface, describe
+from ...plugin.description import Mix, Surface, describe
 from ...plugin.parameter_changes import children
-from .lanes import Lanes
+from ...shading.spectra import spectra_of
+from .diffracting import index_spectra, pack_conservation, pack_constants
+from .features import GLSL
 from .maps import Map, Spectrum, axis_map, colour_map, interval_maps, raw_picture
-from .modelled import Modelled, index_spectra
 from .packing import pack_conductor
-from .solved import SolvedSurface
 from .texels import Packed, Texture, Uniform, as_half, four_channels
 
 _COSINES = 64  # nodes of transmittances
@@ -30,75 +30,49 @@ _LEFT_OUT = ("spec_trans", "anisotropic", "sheen", "flatness", "clearcoat", "spe
 _WRAPPERS = ("TwoSidedBRDF", "BumpMap", "NormalMap", "MaskBSDF")
 _OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
 
-#: Features that the shaders draw.
-GLSL = Consumer(
-    "the realtime renderer",
-    frozenset(Feature) - {
-        Feature.TRANSMISSION, Feature.FILM, Feature.STACK, Feature.PLACED,
-        Feature.VARYING_HEIGHT, Feature.CROSSED, Feature.VARYING_FILM,
-    },
-    "leave it out, or render the scene with Mitsuba",
-    {Feature.CROSSED: "render the scene with Mitsuba"},
-)  # fmt: skip
 
+def pack_gloss(bsdf: Any) -> Packed | None:
+    """Pack the specular reflection of a BSDF that does not diffract, for shaders/gloss.glsl.
 
-@dataclass(frozen=True)
-class Gloss:
-    """Specular reflection of a BSDF that does not diffract."""
+    None for an unsupported kind. The base of plastic has the BRDF ρ/π times the transmittances
+    `through` of both directions, tabulated at cosines even from 0 to 1.
+    """
+    import mitsuba as mi
 
-    bsdf: Any  # BSDF of Mitsuba
-    alpha: float  # roughness; 0 of a smooth face
-    ggx: bool  # distribution of facets: GGX, or else Beckmann
-    # (n,) transmittance at cosines even from 0 to 1, None of a metal and the principled BSDF. The
-    # base has the BRDF ρ/π times the transmittances of both directions.
-    through: NDArray[np.float64] | None
-    omissions: tuple[str, ...] = ()  # unsupported features, in a few words each
+    kind, parameters = bsdf.class_name(), mi.traverse(bsdf)
+    if kind not in _KINDS:
+        return None
 
-    @classmethod
-    def read(cls, bsdf: Any) -> Gloss | None:
-        """Read the gloss of a BSDF, or return None for an unsupported kind."""
-        import mitsuba as mi
+    def number(name: str) -> float:
+        return float(np.array(parameters[name]).ravel()[0])
 
-        if bsdf.class_name() not in _KINDS:
-            return None
-        if bsdf.class_name() == "Principled":
-            left_out = (name.replace("_", " ") for name in _LEFT_OUT if _mean(bsdf, name) > 0.0)
-            alpha = max(_mean(bsdf, "roughness") ** 2, 1e-3)  # Mitsuba's formula
-            return cls(bsdf, alpha, True, None, tuple(f"the {part}" for part in left_out))
-        parameters = mi.traverse(bsdf)
-        alpha = next((parameters[n] for n in ("alpha", "alpha.value") if n in parameters), 0.0)
-        if bsdf.class_name().startswith("Rough") and not np.any(alpha):
-            return None  # anisotropic, or a texture
-        metal = bsdf.class_name().endswith("Conductor")
-        through = None if metal else _through(bsdf)
-        rough = float(np.array(alpha).ravel()[0])
-        return cls(bsdf, rough, "distribution = ggx" in str(bsdf), through)
-
-    @property
-    def pigment(self) -> Any:
-        """Texture of the diffuse base, None of a metal."""
-        textures = children(self.bsdf)
-        return textures.get("diffuse_reflectance", textures.get("base_color"))
-
-    def packed(self) -> Packed:
-        """Pack the gloss for shaders/gloss.glsl."""
-        import mitsuba as mi
-
-        definitions = {"GLOSS": ""} | ({"GGX": ""} if self.ggx else {})
-        if self.alpha == 0.0:
-            definitions["MIRROR"] = ""
-        packed = Packed((), {"gloss_alpha": self.alpha}, definitions)
-        if self.bsdf.class_name() == "Principled":
-            return packed | _principled(self.bsdf)
-        parts = children(self.bsdf)
-        if self.through is None:
-            return packed | pack_conductor(*index_spectra(parts["eta"], parts["k"]))
-        eta = float(np.array(mi.traverse(self.bsdf)["eta"]).ravel()[0])
-        rows = np.repeat(self.through.reshape(1, -1, 1), 4, axis=2).astype(np.float32)
-        face = Packed(
-            (Texture("through", rows),), {"eta": eta}, {"SURFACE_KIND": "1", "THROUGH": ""}
-        )
-        return packed | face
+    if kind == "Principled":
+        roughness = _mean(bsdf, "roughness")
+        # Mitsuba's formulas
+        alpha = max(roughness**2, 1e-3)
+        if "eta" not in parameters:
+            eta = 2.0 / (1.0 - np.sqrt(0.08 * number("specular"))) - 1.0
+        else:
+            eta = number("eta")
+        uniforms: dict[str, Uniform] = {
+            "gloss_alpha": alpha, "eta": eta, "metallic": _mean(bsdf, "metallic"),
+            "roughness": roughness,
+        }  # fmt: skip
+        definitions = dict.fromkeys(("GLOSS", "GGX", "PIGMENTED", "PRINCIPLED"), "")
+        return Packed((), uniforms, definitions | {"SURFACE_KIND": "1"})
+    alphas = next((parameters[n] for n in ("alpha", "alpha.value") if n in parameters), 0.0)
+    if kind.startswith("Rough") and not np.any(alphas):
+        return None  # anisotropic, or a texture
+    alpha = float(np.array(alphas).ravel()[0])
+    marks = {"GGX": "distribution = ggx" in str(bsdf), "MIRROR": alpha == 0.0, "GLOSS": True}
+    definitions = {name: "" for name, has in marks.items() if has}
+    packed = Packed((), {"gloss_alpha": alpha}, definitions)
+    if kind.endswith("Conductor"):
+        parts = children(bsdf)
+        return packed | pack_conductor(*index_spectra(parts["eta"], parts["k"]))
+    rows = np.repeat(_through(bsdf).reshape(1, -1, 1), 4, axis=2).astype(np.float32)
+    face = {"SURFACE_KIND": "1", "THROUGH": "", "PIGMENTED": ""}
+    return packed | Packed((Texture("through", rows),), {"eta": number("eta")}, face)
 
 
 def _mean(bsdf: Any, name: str) -> float:
@@ -106,51 +80,25 @@ def _mean(bsdf: Any, name: str) -> float:
     return float(np.array(children(bsdf)[name].mean()).ravel()[0])
 
 
-def _principled(bsdf: Any) -> Packed:
-    """Pack index, metallic and roughness of the principled BSDF."""
-    import mitsuba as mi
-
-    parameters = mi.traverse(bsdf)
-    if "eta" in parameters:
-        eta = float(np.array(parameters["eta"]).ravel()[0])
-    else:
-        specular = float(np.array(parameters["specular"]).ravel()[0])
-        eta = 2.0 / (1.0 - np.sqrt(0.08 * specular)) - 1.0  # Mitsuba's formula
-    return Packed(
-        (),
-        {"eta": eta, "metallic": _mean(bsdf, "metallic"), "roughness": _mean(bsdf, "roughness")},
-        {"SURFACE_KIND": "1", "PRINCIPLED": ""},
-    )
-
-
 def _through(bsdf: Any) -> NDArray[np.float64]:
     """Return the transmittance of the face from Mitsuba's values of the diffuse part."""
+    import drjit as dr
     import mitsuba as mi
 
     cosines = np.maximum(np.linspace(0.0, 1.0, _COSINES), 1e-3)
     context = mi.BSDFContext()
     context.type_mask = mi.BSDFFlags.Diffuse
-    lanes = Lanes(_COSINES, np.full(4, 550.0))
-    si = lanes.interaction()
-    si.uv = mi.Point2f(0.5, 0.5)
     sines = np.sqrt(1.0 - cosines**2)
-    si.wi = mi.Vector3f(mi.Float(sines), 0.0, mi.Float(cosines))
-    reflected = bsdf.eval(context, si, mi.Vector3f(0.0, 0.0, 1.0))
-    pigment = children(bsdf)["diffuse_reflectance"].eval(si)
-    value = lanes.spectra(mi.unpolarized_spectrum(reflected))[:, 0].astype(float)
-    base = lanes.spectra(pigment)[:, 0].astype(float)
-    twice = np.divide(np.pi * value, base, out=np.zeros(_COSINES), where=base > 0.0)
+
+    def twice_passed(si: Any) -> Any:
+        si.uv = mi.Point2f(0.5, 0.5)
+        si.wi = mi.Vector3f(mi.Float(sines), 0.0, mi.Float(cosines))
+        reflected = bsdf.eval(context, si, mi.Vector3f(0.0, 0.0, 1.0))
+        base = children(bsdf)["diffuse_reflectance"].eval(si)
+        return dr.select(base > 0.0, np.pi * mi.unpolarized_spectrum(reflected) / base, 0.0)
+
+    twice = spectra_of(twice_passed, np.full(4, 550.0), _COSINES)[:, 0].astype(float)
     return np.asarray(twice / np.sqrt(max(float(twice[-1]), 1e-12)))
-
-
-#: Table of a surface, packed for shaders.
-Diffracting = Modelled | SolvedSurface
-
-
-def packed_by(described: Surface) -> Diffracting:
-    """Return what packs the table of a surface."""
-    orders = described.orders
-    return Modelled(described) if orders is None else SolvedSurface(described, orders)
 
 
 @dataclass(frozen=True)
@@ -158,11 +106,11 @@ class ShaderMaterial:
     """Material of one shape."""
 
     pigment: Map  # diffuse reflectance, linear sRGB
-    diffraction: Diffracting | None = None
+    diffraction: Surface | None = None  # None where nothing diffracts
     two_sided: bool = False  # whether the back reflects like the front
     # (cos, sin) from the tangent to the patch's x axis, and the factor by which it is stretched
     axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0, 1.0])))
-    gloss: Gloss | None = None  # specular reflection of a BSDF that does not diffract
+    gloss: Packed | None = None  # specular reflection of a BSDF that does not diffract
     bumps: Map | None = None  # heights (rows, columns, 1) in the scene's unit, or None
     normals: Map | None = None  # (rows, columns, 3) in the shading frame, or None
     mask: Map | None = None  # interval of [0, 1) that the surface takes in a mix, or None
@@ -222,18 +170,24 @@ def read_materials(
         pigment = Map(np.zeros(3))
         if (nested := described.nested) is not None:
             pigment = _diffuse(nested, omissions, f"the base beneath {name}", light)
-        material = ShaderMaterial(pigment, packed_by(described), axis=axis_map(described))
-    elif (gloss := Gloss.read(bsdf)) is not None:
-        omissions += [f"{part} of {name}" for part in gloss.omissions]
-        pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
+        material = ShaderMaterial(pigment, described, axis=axis_map(described))
+    elif (gloss := pack_gloss(bsdf)) is not None:
+        if bsdf.class_name() == "Principled":
+            left_out = (part for part in _LEFT_OUT if _mean(bsdf, part) > 0.0)
+            omissions += [f"the {part.replace('_', ' ')} of {name}" for part in left_out]
+        texture = _base(bsdf)
+        pigment = Map(np.zeros(3)) if texture is None else colour_map(texture, light)
         material = ShaderMaterial(pigment, gloss=gloss)
     else:
         material = ShaderMaterial(_diffuse(bsdf, omissions, name, light))
     return [replace(material, two_sided=two_sided, bumps=bumps, normals=normals)]
 
 
-def pack_surface(material: ShaderMaterial) -> Packed:
-    """Pack a material without its tables and energy conservation."""
+def pack_surface(material: ShaderMaterial, factors: Sequence[float] = (1.0,)) -> Packed:
+    """Pack a material without its tables.
+
+    factors : on the height scale, with a page of energy conservation each.
+    """
     uniforms: dict[str, Uniform] = {"two_sided": material.two_sided}
     definitions: dict[str, str] = {}
     textures = []
@@ -250,24 +204,14 @@ def pack_surface(material: ShaderMaterial) -> Packed:
             marks = {"MAPPED": True, "CLAMPED": value.clamped, "NEAREST": value.nearest}
             definitions |= {f"{name.upper()}_{mark}": "true" for mark, on in marks.items() if on}
     packed = Packed(tuple(textures), uniforms, definitions)
-    diffraction, gloss = material.diffraction, material.gloss
-    if diffraction is None:
-        pigmented = gloss is None or gloss.pigment is not None
-    else:
-        pigmented = diffraction.described.nested is not None
-    if pigmented:
-        definitions["PIGMENTED"] = ""
+    described, gloss = material.diffraction, material.gloss
     if gloss is not None:
-        return packed | gloss.packed()
-    return packed if diffraction is None else packed | diffraction.surface()
-
-
-def pack_conservation(material: ShaderMaterial, factors: Sequence[float] = (1.0,)) -> Packed:
-    """Pack energy conservation and the base's light, at the height scale times each factor."""
-    if material.diffraction is None:
-        return Packed()
-    height_scale = material.diffraction.described.height_scale.number
-    return material.diffraction.conservation([height_scale * factor for factor in factors])
+        return packed | gloss
+    if described is None or described.nested is not None:
+        definitions["PIGMENTED"] = ""
+    if described is None:
+        return packed
+    return packed | pack_constants(described) | pack_conservation(described, factors)
 
 
 def pack_emission(radiance: Real | None) -> Packed:
@@ -293,11 +237,16 @@ def diffracts(bsdf: Any) -> bool:
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:
     """Return the reflectance of a diffuse BSDF; other kinds become their diffuse part, or grey."""
-    textures, kind = children(bsdf), bsdf.class_name()
-    for key in ("diffuse_reflectance", "base_color", "reflectance"):
-        if key in textures:
-            if kind != "SmoothDiffuse":
-                omissions.append(f"the gloss of {name} ({kind})")
-            return colour_map(textures[key], light)
+    kind = bsdf.class_name()
+    if (texture := _base(bsdf)) is not None:
+        if kind != "SmoothDiffuse":
+            omissions.append(f"the gloss of {name} ({kind})")
+        return colour_map(texture, light)
     omissions.append(f"the material of {name} ({kind}, shown as grey)")
     return Map(np.full(3, _OTHER_GREY))
+
+
+def _base(bsdf: Any) -> Any:
+    """Return the texture of a BSDF's diffuse part, or None."""
+    names, textures = ("diffuse_reflectance", "base_color", "reflectance"), children(bsdf)
+    return next((textures[name] for name in names if name in textures), None)

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.special import ndtr
 
 from ...arrays import Real
-from ...optics.colour import RGB_WAVELENGTHS
-from ...optics.geometry import wavenumber
 from ...orders import OrderTable
 from ...orders.daylight import ENDS, daylight_weights
 from ...orders.rows import leaving_transmittance
-from ...plugin.description import Surface
 from ...shading import orders
-from .lobes import AZIMUTHS, RINGS, pack_lobes
+from .lobes import AZIMUTHS, RINGS
 from .texels import Packed, Texture
 
 #: Largest size of the efficiencies, bytes.
@@ -23,38 +18,6 @@ MOST_BYTES = 48 << 20
 
 # lobes: directions and wavelengths of the mean efficiencies
 _DIRECTIONS, _WAVELENGTHS = 32, 24
-
-
-class SolvedSurface:
-    """Table of solved orders of a surface as textures and constants."""
-
-    height_room = np.inf  # nothing depends on a height scale
-
-    def __init__(self, described: Surface, table: OrderTable) -> None:
-        self.described, self.table = described, table
-
-    @property
-    def words(self) -> str:
-        """See `Modelled.words`."""
-        return f"{self.table}, coherence width {self.described.coherence_width:g} µm"
-
-    def surface(self) -> Packed:
-        """See `Modelled.surface`."""
-        channels = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
-        return Packed((), {"channel_wavenumbers": channels}, {"DIFFRACTING": ""})
-
-    def conservation(self, scales: Sequence[float]) -> Packed:
-        """See `Modelled.conservation`: solved orders conserve energy."""
-        return Packed()
-
-    def tables(self, method: str) -> Packed:
-        """See `Modelled.tables`."""
-        return pack_orders(method, self.table, self.described.sigma)
-
-    def lobes(self) -> Packed:
-        """See `Modelled.lobes`."""
-        sigma = self.described.sigma
-        return pack_lobes(lambda edges: order_power(self.table, sigma, edges), sigma)
 
 
 def pack_orders(

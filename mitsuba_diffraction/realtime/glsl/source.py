@@ -22,10 +22,17 @@ LIGHTS = 4
 
 _CONSTANTS = {
     "PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS),
-    "SURFACE_KIND": "0", "LIGHTS_LIT": "1", "TEXELS": "1", "TAPS_X": "1", "TAPS_Y": "1",
+    "SURFACE_KIND": "0", "LIGHTS_LIT": "1", "TEXELS": "1",
     "COLOUR_CLAMPED": "false", "AXIS_CLAMPED": "false", "MASK_CLAMPED": "false",
     "COLOUR_NEAREST": "false", "AXIS_NEAREST": "false", "MASK_NEAREST": "false",
 }  # fmt: skip
+
+#: Files of the surroundings, which lobes look up.
+_LOOKED_UP = (
+    "#if defined(WEIGHTED) || defined(LOOKED_UP)",
+    "obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl",
+    "#endif",
+)  # fmt: skip
 
 _PREAMBLES = {
     "desktop": "#version 330 core\n",
@@ -48,14 +55,11 @@ def fragment_parts(
 
     Raises a DiffractionError if the method is unknown.
     """
-    files = [*surface_files(definitions), "frame.glsl"]
     further = {"SHADOWED": "shadow.glsl", "GLOSS": "gloss.glsl"}
+    files = [*surface_files(definitions), "frame.glsl"]
     files += [name for definition, name in further.items() if definition in definitions]
-    if "WEIGHTED" in definitions or "LOOKED_UP" in definitions:
-        files += ["obstacles.glsl", "surroundings.glsl", "bounces.glsl", "lobes.glsl"]
-    return source_parts(
-        [*files, *method_files(method, definitions), "surface.frag"], definitions, dialect
-    )
+    files += [*_LOOKED_UP, *method_files(method, definitions), "surface.frag"]
+    return source_parts(files, definitions, dialect)
 
 
 def source_parts(
@@ -63,7 +67,7 @@ def source_parts(
 ) -> list[tuple[str, str]]:
     """Return names and texts of a preamble with these definitions, and of files.
 
-    files : names of files, or `formulas`; the last one has the stage's main function.
+    files : names of files, `formulas` or directives; the last one has the stage's main function.
     """
     known = _CONSTANTS | dict(definitions or {})
     lines = [f"#define {name} {value}\n" for name, value in known.items()]
@@ -72,7 +76,9 @@ def source_parts(
 
 
 def part(name: str, definitions: Mapping[str, str]) -> str:
-    """Return the text of a file, or of `formulas`."""
+    """Return the text of a file, of `formulas`, or of a directive."""
+    if name.startswith("#"):
+        return f"{name}\n"
     if name == "formulas":
         return formulas(definitions)
     packages = (method.package for method in METHODS.values() if name in method.files)

@@ -1,7 +1,7 @@
 """Surroundings of a scene, which shaders look up along directions drawn from a surface's lobes.
 
 Lights that are drawn independently of a surface rarely lie in a narrow lobe. So every other frame
-of `progressive` draws a direction from the surface's lobe at each pixel, and looks up the light
+of progressive light draws a direction from the surface's lobe at each pixel, and looks up the light
 from that direction: flat area lights, and the environment. The balance heuristic (Veach and Guibas
 1995) weights the two kinds of frames.
 
@@ -24,10 +24,10 @@ from ...analysis.maps.hemisphere import polar
 from ...arrays import Real
 from ...errors import DiffractionError
 from ...scene.elements import name_of
-from .lights import AROUND_SUN, area_of, emitted_radiance, radiance_along
+from .lights import AROUND_SUN, area_of, emitted_radiance, radiance_along, sun_of
 from .scene import sample_normal
 from .shadows import frame_along
-from .texels import Packed, Texture, Uniform, as_half, pack_grid
+from .texels import Packed, Texture, Uniform, as_half, four_channels, pack_grid
 
 # grid of distances
 _CELLS = 1 << 22  # approximate number of cells
@@ -106,10 +106,9 @@ class Environment:
         theta = np.pi * (np.arange(rows)[:, None] + 0.5) / rows
         phi = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
         directions = polar(*np.broadcast_arrays(theta, phi))
-        sun, radiance = np.zeros(3), np.zeros(3)
-        if "sun_direction" in parameters:
-            sun = np.array(parameters["sun_direction"], float).ravel()
-            directions = beside(sun, directions)
+        sun, radiance = sun_of(emitter), np.zeros(3)
+        if sun.any():
+            directions = _beside(sun, directions)
             radiance = radiance_along(emitter, _disc(sun, _SUN_RADIUS)).mean(axis=0)
         with np.errstate(invalid="ignore"):
             picture = radiance_along(emitter, directions.reshape(-1, 3))
@@ -150,11 +149,9 @@ class Environment:
 
         share : probability of lights drawn from the environment.
         """
-        rows, columns, _ = self.picture.shape
-        four = np.concatenate([self.picture, np.zeros((rows, columns, 1), np.float32)], axis=2)
         cosine = np.cos(_SUN_RADIUS) if self.sun.any() else 2.0
         return Packed(
-            (Texture("environment", as_half(four), smooth=True),),
+            (Texture("environment", as_half(four_channels(self.picture)), smooth=True),),
             {
                 "environment_density": share / self.total if self.total > 0.0 else 0.0,
                 "sun": (*self.sun.tolist(), float(cosine)),
@@ -204,10 +201,8 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
     return Packed((), uniforms, {"FLATS": str(len(shapes)), "DISKS": str(disks)})
 
 
-def beside(sun: Real, directions: Real) -> Real:
-    """Turn unit vectors (..., 3) that point to the sun, if any, aside, to the sky's light alone."""
-    if not sun.any():
-        return directions
+def _beside(sun: Real, directions: Real) -> Real:
+    """Turn unit vectors (..., 3) that point to the sun aside, to the sky's light alone."""
     aside = sun + np.tan(1.5 * AROUND_SUN) * frame_along(sun)[0]
     inside = directions @ sun > np.cos(AROUND_SUN)
     return np.where(inside[..., None], aside / np.linalg.norm(aside), directions)

@@ -17,9 +17,8 @@ from ...errors import DiffractionError
 #: Texels per row of a list: every OpenGL 3.3 and nearly every WebGL 2 has textures this wide.
 PAGE = 1 << 12
 
-#: Largest relative error of a sum of coefficients for which half floats are used.
+#: Largest relative error Σ|half(x) − x| / Σ|x| for which half floats are used.
 HALF_ERROR = 2e-4
-_SAMPLED = 1 << 20  # numbers from which that error is estimated
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -102,24 +101,13 @@ def four_channels(picture: NDArray[Any]) -> NDArray[Any]:
     return np.pad(picture, [(0, 0), (0, 0), (0, 4 - picture.shape[2])])
 
 
-def half_error(values: NDArray[np.floating]) -> float:
-    """Return Σ|half(x) − x| / Σ|x|, the error of half floats, from at most a million numbers."""
-    sample = values.ravel()
-    if sample.size > _SAMPLED:
-        sample = sample[np.random.default_rng(0).integers(0, sample.size, _SAMPLED)]
-    rounded = sample.astype(np.float16).astype(sample.dtype)
-    total = float(np.abs(sample).sum(dtype=np.float64))
-    return float(np.abs(rounded - sample).sum(dtype=np.float64)) / total if total > 0.0 else 0.0
-
-
 def as_half(values: NDArray[np.floating]) -> NDArray[np.floating]:
     """Convert values to half floats if the error is small enough, else to single precision."""
-    if values.dtype == np.float16:
-        return values
-    values = values.astype(np.float32, copy=False)
-    if np.abs(values).max(initial=0.0) < 6e4 and half_error(values) <= HALF_ERROR:
-        return values.astype(np.float16)
-    return values
+    values = values if values.dtype == np.float16 else values.astype(np.float32, copy=False)
+    with np.errstate(over="ignore"):  # of numbers beyond the halves, whose error is infinite
+        half = values.astype(np.float16)
+    error, size = (np.abs(x).sum(dtype=np.float64) for x in (half - values, values))
+    return half if error <= HALF_ERROR * size else values
 
 
 def shortened(values: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -144,13 +132,10 @@ def paired(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.asarray(low >> 16 | high, np.uint32).view(np.float32)
 
 
-def plain(value: Any) -> Any:
+def plain(value: Uniform) -> Any:
     """Convert a uniform to JSON types; an array becomes one flat list."""
-    if isinstance(value, np.ndarray):
-        return value.ravel().tolist()
-    if isinstance(value, tuple):
-        return [plain(v) for v in value]
-    return value.item() if isinstance(value, np.generic) else value
+    array = np.asarray(value)
+    return array.ravel().tolist() if array.ndim else array.item()
 
 
 def distinct_rows(rows: NDArray[Scalar]) -> tuple[NDArray[Scalar], NDArray[np.uint32]]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...analysis.timing import rounds_of
 from .context import Bindings, VertexBuffer
+from .packing import pack_responses
 from .renderer import Renderer
 from .source import LIGHTS
 from .texels import Packed
@@ -39,7 +40,8 @@ def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, floa
     vertices[:, 9:11] = 0.5 * (corners + 1.0)
     vertices[:, 11:] = [0.1, 0.1, 0.1, 1.0, 0.0, 1.0]
     buffer, target = VertexBuffer(renderer.context, vertices), renderer.target(SIDE, SIDE)
-    light = Bindings(renderer.context, Packed((), {
+    spectra = [(light.wavelengths, light.spectrum) for light in renderer.lights]
+    light = Bindings(renderer.context, pack_responses(spectra) | Packed((), {
         "view_projection": tuple(np.eye(4).ravel().tolist()), "eye": _EYE,
         "light_place": np.array([_LIGHT] * LIGHTS, np.float32),
         "light_colour": np.ones((LIGHTS, 3), np.float32),
@@ -48,11 +50,9 @@ def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, floa
     def seconds(method: str) -> float:
         """Return the seconds of one picture."""
         parts = light, renderer.bindings[number], renderer.tables(method)[number]
-        program = renderer.program(method, parts)
-        array = buffer.array(program)
+        array = buffer.array(renderer.bound(method, parts))
         target.frame.use()
         renderer.context.enable_only(renderer.context.NOTHING)  # no depth test
-        renderer.bind(program, parts, renderer.lights)
         clock, times = renderer.clock, 1
         while True:
             start = clock()

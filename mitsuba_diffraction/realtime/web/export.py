@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from ...atomic import atomic_path
 from ...errors import DiffractionError, check_choice
 from ...optics.display import VIEWS
+from ...plugin.description import Surface
 from ...progress import Progress, showing, silent, tracked
 from ..glsl.methods import WEB_METHODS, check_methods, refusal
 from ..glsl.packed_scene import PackedScene, PackedSurface
 from ..glsl.rewriting import shader_file
-from ..glsl.scene import RealtimeScene
-from ..glsl.shader_materials import Diffracting
-from ..glsl.source import display_definitions, fragment_parts, web_source
+from ..glsl.source import display_definitions, fragment_parts, joined, web_source
 from .light import packed_light, packed_surroundings
 from .material_choices import INDEXED, packed_materials
 from .sections import Sections, packed_array, packed_mesh, packed_parts
@@ -42,7 +41,7 @@ CODE_BYTES = 200_000
 
 _SCRIPTS = (
     "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "shadow.js",
-    "surroundings.js", "viewer.js", "link.js", "map.js", "controls.js", "main.js",
+    "viewer.js", "link.js", "map.js", "controls.js", "main.js",
 )  # fmt: skip
 
 
@@ -195,7 +194,8 @@ class _Writer:
         The last methods are left out if their tables exceed the size of the page.
         """
         fitted, left_out = self._fitted(methods, progress)
-        header = {
+        scene = self._packed.scene
+        header: dict[str, Any] = {
             "title": title,
             "methods": list(fitted),
             "left_out": left_out,
@@ -206,11 +206,23 @@ class _Writer:
             # ends of the slider of height scales, and pages of energy scales
             "octaves": (self._packed.octaves[0], self._packed.octaves[-1]),
             "energy_pages": len(self._packed.octaves),
-            **self._tables(fitted),
-            **self._shaded(fitted),
+            "tables": {method: [t.parts for t in tables] for method, tables in fitted.items()},
+            "loss": {m: tuple(np.max([t.loss for t in tables], axis=0).tolist())
+                     for m, tables in fitted.items()},
+            "orders": [strongest_orders(described) for described in self._packed.diffracting],
+            "surfaces": [self._surface(*pair, fitted)
+                         for pair in zip(self._packed.surfaces, self._surfaces, strict=True)],
             **_shaders(view),
-            **_framed(self._packed.scene),
-        }
+            "camera": {
+                "to_world": scene.camera.to_world.tolist(), "fov": scene.camera.fov,
+                "size": scene.camera.size, "offset": scene.camera.offset,
+            },
+            "box": [scene.low.tolist(), scene.high.tolist()],
+            "subject": [x.tolist() for x in scene.subject],
+            "background": _zenith(scene.lighting.sky),
+        }  # fmt: skip
+        sources = np.frombuffer(json.dumps(self._sources).encode(), np.uint8)
+        header["programs"] = self._sections.add(packed_array(sources[:, None]))
         data, header["sections"] = self._sections.joined()
         return header, data
 
@@ -225,12 +237,12 @@ class _Writer:
         left_out = {
             method: refusals[0]
             for method in methods
-            if (refusals := [r for s in diffracting if (r := refusal(method, s.described))])
+            if (refusals := [r for s in diffracting if (r := refusal(method, s))])
         }
         shown = [method for method in methods if method not in left_out]
         while shown:
             for digits in DIGITS:
-                self._sections = others.copy()
+                self._sections = Sections(others)
                 fitted = {
                     method: [self._rounded(method, one, digits) for one in diffracting]
                     for method in tracked(shown, progress, f"rounding tables to {digits} digits")
@@ -247,52 +259,32 @@ class _Writer:
             "coherence_width, or a shallower surface"
         )
 
-    def _rounded(self, method: str, surface: Diffracting, digits: int) -> _Table:
+    def _rounded(self, method: str, described: Surface, digits: int) -> _Table:
         """Round a table, and store it."""
-        packed, loss = web_table(method, surface, digits)
+        packed, loss = web_table(method, described, digits)
         return _Table(packed_parts(packed, self._sections), packed.definitions, loss)
 
-    def _tables(self, fitted: Mapping[str, list[_Table]]) -> dict[str, Any]:
-        """Return sections of each table, largest losses by method, and brightest orders."""
-        losses = {m: zip(*(t.loss for t in tables), strict=True) for m, tables in fitted.items()}
-        return {
-            "tables": {method: [t.parts for t in tables] for method, tables in fitted.items()},
-            "loss": {method: tuple(map(max, pairs)) for method, pairs in losses.items()},
-            "orders": [strongest_orders(table.described) for table in self._packed.diffracting],
-        }
-
-    def _shaded(self, fitted: Mapping[str, list[_Table]]) -> dict[str, Any]:
-        """Return the surfaces, and the section of all distinct sources of their shaders."""
-        surfaces = []
-        for surface, stored in zip(self._packed.surfaces, self._surfaces, strict=True):
-            definitions = {
-                method: dict(surface.packed.definitions)
-                if surface.table is None
-                else {**surface.packed.definitions, **tables[surface.table].definitions}
-                for method, tables in fitted.items()
-            }
-            surfaces.append({**stored, **self._surface(surface, definitions)})
-        joined = json.dumps(self._sources).encode()
-        programs = packed_array(np.frombuffer(joined, np.uint8)[:, None])
-        return {"surfaces": surfaces, "programs": self._sections.add(programs)}
-
     def _surface(
-        self, surface: PackedSurface, definitions: Mapping[str, dict[str, str]]
+        self, surface: PackedSurface, stored: dict[str, Any], fitted: Mapping[str, list[_Table]]
     ) -> dict[str, Any]:
         """Return a surface's entry; numbers of programs and tables are indices of the header's.
 
         `named` are its programs with one of the header's materials, empty where it cannot change.
         """
-        coat = _coat(surface)
-        diffraction = surface.scene.material.diffraction
-        described = None if diffraction is None else diffraction.described
+        coat, table = _coat(surface), surface.table
+        described, own = surface.scene.material.diffraction, surface.packed.definitions
+        definitions = {
+            method: {**own, **({} if table is None else tables[table].definitions)}
+            for method, tables in fitted.items()
+        }
         named = {} if coat is None else {m: {**d, **INDEXED} for m, d in definitions.items()}
         return {
+            **stored,
             "name": surface.scene.name,
             "emits": surface.scene.radiance is not None,
             "lamp": surface.scene.lamp,
             "height_scale": None if described is None else described.height_scale.number,
-            "table": surface.table or 0,
+            "table": table or 0,
             "programs": {m: self._program(m, d) for m, d in definitions.items()},
             "named": {m: self._program(m, d) for m, d in named.items()},
             "coat": 0 if coat is None else self._coats.index(coat),
@@ -305,7 +297,7 @@ class _Writer:
         The page replaces LIGHTS_LIT by its light's definitions and appends one of `mains`.
         """
         live = {**definitions, **self._around_definitions, "SHADOWED": "", "LIVE": ""}
-        source = _source(method, live)
+        source = joined(fragment_parts(method, live, "web")[:-1])
         if source not in self._sources:
             self._sources.append(source)
         return self._sources.index(source)
@@ -316,10 +308,8 @@ def _coat(surface: PackedSurface) -> float | None:
 
     The materials of solved orders and of mirrors cannot.
     """
-    diffraction = surface.scene.material.diffraction
-    if diffraction is None or diffraction.described.index is None:
-        return None
-    return diffraction.described.coat or 1.0
+    described = surface.scene.material.diffraction
+    return None if described is None or described.index is None else described.coat or 1.0
 
 
 def _shaders(view: str) -> dict[str, Any]:
@@ -334,30 +324,6 @@ def _shaders(view: str) -> dict[str, Any]:
         "add": web_source("add.frag"),
         "shown": {"vertex": web_source("whole.vert"), "fragment": display},
     }
-
-
-def _framed(scene: RealtimeScene) -> dict[str, Any]:
-    """Return camera, corners of the scene and of what diffracts, and radiance of the sky."""
-    return {
-        "camera": {
-            "to_world": scene.camera.to_world.tolist(),
-            "fov": scene.camera.fov,
-            "size": list(scene.camera.size),
-            "offset": list(scene.camera.offset),
-        },
-        "box": [scene.low.tolist(), scene.high.tolist()],
-        "subject": [x.tolist() for x in scene.subject],
-        "background": _zenith(scene.lighting.sky),
-    }
-
-
-def _source(method: str, definitions: dict[str, str]) -> str:
-    """Return a source without its main function; code of surroundings is conditional."""
-    parts = dict(fragment_parts(method, definitions, "web")[:-1])
-    with_surroundings = fragment_parts(method, {**definitions, "LOOKED_UP": ""}, "web")[:-1]
-    further = "".join(text for name, text in with_surroundings if name not in parts)
-    conditional = f"#if defined(WEIGHTED) || defined(LOOKED_UP)\n{further}#endif\n"
-    return "".join((*parts.values(), conditional))
 
 
 def _omissions(packed: PackedScene) -> list[str]:

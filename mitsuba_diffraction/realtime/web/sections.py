@@ -1,15 +1,13 @@
 """Compression of arrays, triangles and textures for the page.
 
-Arrays are stored as planes of bytes, in the layout that zlib compresses best, and compressed;
-`data.js` decodes them.
+Arrays are stored as planes of bytes, and compressed; `data.js` decodes them.
 """
 
 from __future__ import annotations
 
 import io
-import itertools
 import zlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,8 +19,7 @@ from ..glsl.scene import VERTEX
 from ..glsl.texels import Packed, Texture, distinct_rows, plain
 
 _LEVEL = 7  # 8 and 9 take two and three times as long, and save at most 2 % of a page
-_ROWS = (1, 2, 3, 4, 6, 8, 12)  # rows that may stand in one
-_SAMPLED = 1 << 22  # bytes that the layout is chosen by
+_SAMPLED = 1 << 22  # bytes from which is known whether differences are smaller
 
 _STEPS = 65535  # integer that encodes the far side of a bounding box
 
@@ -36,11 +33,10 @@ class Section:
 
 
 def packed_array(values: NDArray[Any]) -> Section:
-    """Compress an array (rows, columns) without loss, in the smallest of some layouts.
+    """Compress an array (rows, columns) without loss: its bits, or their differences if smaller.
 
-    A layout has rows of `columns` numbers, or of a multiple of `columns`. It holds the bits of each
-    number, or the difference from the bits in the row before. All first bytes of a column are
-    adjacent, then all second bytes: similar bytes compress well. Zeros fill up the last row.
+    Differences are from the bits in the row before. All first bytes of a column are adjacent, then
+    all second bytes: similar bytes compress well.
 
     values : values of a type that JavaScript has an array of, or half floats.
     """
@@ -49,59 +45,41 @@ def packed_array(values: NDArray[Any]) -> Section:
     bits = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
     bits = bits.view(f"<u{bits.itemsize}")
     some = bits[: max(_SAMPLED // bits.strides[0], 1)]
-    layouts = itertools.product(_ROWS, (False, True))
-    rows, differences = min(layouts, key=lambda one: len(zlib.compress(_planes(some, *one), 1)))
+    chosen = min((False, True), key=lambda one: len(zlib.compress(_planes(some, one), 1)))
     layout = {
-        "kind": f"{kind.capitalize()}Array", "numbers": bits.size,
-        "columns": bits.shape[1] * rows, "differences": differences,
+        "kind": f"{kind.capitalize()}Array", "columns": bits.shape[1], "differences": chosen
     }  # fmt: skip
-    return Section(zlib.compress(_planes(bits, rows, differences), _LEVEL), layout)
+    return Section(zlib.compress(_planes(bits, chosen), _LEVEL), layout)
 
 
-def _planes(bits: NDArray[Any], rows: int, differences: bool) -> bytes:
-    """Return the bytes of integers, column by column, with several of their rows in one."""
-    wide = as_columns(bits, bits.shape[1] * rows)
+def _planes(bits: NDArray[Any], differences: bool) -> bytes:
+    """Return the bytes of integers, or of their differences, column by column."""
     if differences:  # wrap around, here and in the page
-        wide = np.concatenate([wide[:1], wide[1:] - wide[:-1]])
-    return wide.view(np.uint8).reshape(len(wide), -1).T.tobytes()
+        bits = np.concatenate([bits[:1], bits[1:] - bits[:-1]])
+    return bits.view(np.uint8).reshape(len(bits), -1).T.tobytes()
 
 
-def as_columns(data: Any, width: int) -> Any:
-    """Arrange a texture's numbers in rows of a given width; the last row is padded with zeros."""
-    flat = data.reshape(-1)
-    missing = -len(flat) % width
-    return (np.pad(flat, (0, missing)) if missing else flat).reshape(-1, width)
-
-
-class Sections:
+class Sections(list[Section]):
     """Data of the page, a sequence of sections."""
-
-    def __init__(self, parts: Iterable[Section] = ()) -> None:
-        self._parts = list(parts)
-
-    def copy(self) -> Sections:
-        """Return a sequence that begins with these sections."""
-        return Sections(self._parts)
 
     def add(self, section: Section) -> int:
         """Append a section unless it exists, and return its number."""
-        if section in self._parts:
-            return self._parts.index(section)
-        self._parts.append(section)
-        return len(self._parts) - 1
+        if section not in self:
+            self.append(section)
+        return self.index(section)
 
     @property
     def nbytes(self) -> int:
         """Number of bytes so far."""
-        return sum(len(part.data) for part in self._parts)
+        return sum(len(part.data) for part in self)
 
     def joined(self) -> tuple[bytes, list[dict[str, Any]]]:
         """Return all bytes, and position and layout of each section."""
         layouts, start = [], 0
-        for part in self._parts:
+        for part in self:
             layouts.append({**part.layout, "start": start, "length": len(part.data)})
             start += len(part.data)
-        return b"".join(part.data for part in self._parts), layouts
+        return b"".join(part.data for part in self), layouts
 
 
 def packed_mesh(vertices: NDArray[np.float32], sections: Sections) -> dict[str, Any]:

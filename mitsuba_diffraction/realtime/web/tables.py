@@ -19,10 +19,9 @@ from ...tables import DiffractionTable
 from ...tables.colour.table import cached_colours, colour_difference, power_colour_difference
 from ...tables.powers import as_powers, powers_at
 from ..glsl.packing import pack_colours, pack_powers
-from ..glsl.shader_materials import Diffracting
 from ..glsl.solved import pack_orders
 from ..glsl.texels import Packed, shortened
-from .sections import as_columns, converted
+from .sections import converted
 
 #: Binary digits of a series' largest number, fewer where tables are too large for a page; of the
 #: most, the mean ΔE2000 stays below 0.1.
@@ -35,7 +34,7 @@ _ORDER_BYTES = 6 << 20  # size of efficiencies of solved orders before compressi
 _BANDS = 4  # bands of solved orders whose colours are compared
 
 
-def web_table(method: str, surface: Diffracting, digits: int) -> tuple[Packed, tuple[float, float]]:
+def web_table(method: str, described: Surface, digits: int) -> tuple[Packed, tuple[float, float]]:
     """Round a table to fewer binary digits for one of `WEB_METHODS`.
 
     `exact` does not support coherent tables.
@@ -43,11 +42,10 @@ def web_table(method: str, surface: Diffracting, digits: int) -> tuple[Packed, t
     Returns textures, uniforms and definitions, and the mean and 99th percentile of ΔE2000 from the
     exact table.
     """
-    orders = surface.described.orders
     packed, loss = (
-        _modelled(method, surface.described.patch, digits)
-        if orders is None
-        else _solved(method, orders, surface.described.sigma, digits)
+        _solved(method, described.orders, described.sigma, digits)
+        if described.solved
+        else _modelled(method, described.patch, digits)
     )
     return packed, (float(loss.mean()), float(np.percentile(loss, 99.0)))
 
@@ -76,7 +74,7 @@ def _solved(method: str, table: OrderTable, sigma: float, digits: int) -> Rounde
     width = 4 * (counts.rho + 1)
 
     def fewer(data: NDArray[np.floating]) -> NDArray[np.float16]:
-        return rounded(as_columns(data, width), digits, FLOOR).reshape(data.shape)
+        return rounded(data.reshape(-1, width), digits, FLOOR).reshape(data.shape)
 
     less = converted(packed, {"efficiencies": fewer})
     return less, _solved_loss(table, counts, digits)

@@ -25,7 +25,7 @@ FILES = {"flss": _SPECTRUM, "nmm": ("taylor.glsl", "nmm.glsl"), "pq": _SPECTRUM}
 
 def _consumer(name: str) -> Consumer:
     from ...plugin.description import Consumer, Feature
-    from ...realtime.glsl.shader_materials import GLSL
+    from ...realtime.glsl.features import GLSL
 
     features = GLSL.shows - {Feature.ORDERS}
     return Consumer(f"method {name} of the thesis", features, "use method fast")

@@ -1,8 +1,6 @@
-"""Triangles of Mitsuba's shapes, those that a shadow map needs, and distances for marched rays."""
+"""Triangles of Mitsuba's shapes, and distances for marched rays."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -10,8 +8,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, bsdf_dict, gratings
 from mitsuba_diffraction.realtime.glsl.packed_scene import PackedScene
-from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of
-from mitsuba_diffraction.realtime.glsl.shadows import Solid, outline
+from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of, winding_of
 from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
 
 
@@ -39,27 +36,15 @@ def test_normals_are_mitsubas(some_variant: str, kind: str, flipped: bool) -> No
     assert np.abs(mean - expected).max() < 0.02
 
 
-def solid_of(**shape: Any) -> Solid:
-    return Solid.analyse(triangles_of(mi.load_dict(shape)).positions.reshape(-1, 3, 3))
-
-
 @pytest.mark.parametrize("mirrored", [1.0, -1.0])
 def test_closed_surfaces_are_told_from_open_ones(some_variant: str, mirrored: float) -> None:
     to_world = mi.ScalarTransform4f().scale([mirrored, 1.0, 1.0])
     for kind, closed in (("sphere", True), ("cube", True), ("cylinder", False), ("disk", False)):
-        shape = {"type": kind, "to_world": to_world}
-        a, b, c = triangles_of(mi.load_dict(shape)).positions.reshape(-1, 3, 3)[1]
+        shape = mi.load_dict({"type": kind, "to_world": to_world})
+        triangles = triangles_of(shape).positions.reshape(-1, 3, 3)
+        a, b, c = triangles[1]
         turn = np.sign(np.cross(b - a, c - a) @ (a + b + c))  # as seen from outside a convex body
-        assert solid_of(**shape).winding == (turn if closed else 0), kind
-
-
-def test_an_outline_reaches_as_far_as_what_it_is_of() -> None:
-    places = np.random.default_rng(0).normal(size=(5000, 3))
-    directions = np.random.default_rng(1).normal(size=(3, 200))
-    for some in (places, places * [1.0, 1.0, 0.0], places[:3]):
-        around = outline(some)
-        assert len(around) < 400 or not some[:, 2].any()
-        assert np.allclose((around @ directions).max(axis=0), (some @ directions).max(axis=0))
+        assert winding_of(triangles) == (turn if closed else 0), kind
 
 
 def test_a_ball_and_a_plate_are_as_far_away_as_they_are(some_variant: str) -> None:

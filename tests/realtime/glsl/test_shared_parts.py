@@ -13,16 +13,11 @@ from numpy.testing import assert_allclose
 from mitsuba_diffraction import HeightField, bsdf_dict, reference
 from mitsuba_diffraction.optics.display import VIEWS, shown
 from mitsuba_diffraction.plugin.description import Surface
+from mitsuba_diffraction.realtime.glsl.diffracting import pack_constants, pack_table
 from mitsuba_diffraction.realtime.glsl.export import make_shader
+from mitsuba_diffraction.realtime.glsl.features import GLSL
 from mitsuba_diffraction.realtime.glsl.maps import axis_map
-from mitsuba_diffraction.realtime.glsl.modelled import Modelled
-from mitsuba_diffraction.realtime.glsl.shader_materials import (
-    GLSL,
-    ShaderMaterial,
-    pack_conservation,
-    pack_surface,
-    packed_by,
-)
+from mitsuba_diffraction.realtime.glsl.shader_materials import ShaderMaterial, pack_surface
 from mitsuba_diffraction.realtime.glsl.source import display_definitions, joined, source_parts
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed, shaded
@@ -38,11 +33,11 @@ STRETCH, WAVELENGTH = 0.7, 550.0
 
 def test_a_stretched_patch_under_a_coat_has_the_reference_s_light(gl: Any) -> None:
     mi.set_variant("scalar_spectral_polarized")
-    surface = Modelled(load(**COATED[0]).describe())
+    surface = load(**COATED[0]).describe()
     wi, wo, _ = pairs()
     wi, wo = wi[::3], wo[::3]
     near = np.arange(len(wi)) < 30
-    parts = surface.surface() | surface.tables("exact") | paired(wi, wo) | Packed(
+    parts = pack_constants(surface) | pack_table(surface, "exact") | paired(wi, wo) | Packed(
         uniforms={"height_scale": 1.0, "wavenumber": 2e3 * np.pi / WAVELENGTH},
         definitions={"MONOCHROME": ""},
     )  # fmt: skip
@@ -104,8 +99,7 @@ def test_gloss_is_mitsuba_s_and_a_base_burley_s(gl: Any) -> None:
 
 
 def packed_of(described: Surface) -> object:
-    drawn = ShaderMaterial(axis_map(described), packed_by(described), axis=axis_map(described))
-    packed = pack_surface(drawn) | pack_conservation(drawn)
+    packed = pack_surface(ShaderMaterial(axis_map(described), described, axis=axis_map(described)))
     textures = {texture.name: texture.data.tobytes() for texture in packed.textures}
     scale, axis = described.height_scale.number, axis_map(described).value.tolist()
     return packed.uniforms, packed.definitions, textures, scale, axis

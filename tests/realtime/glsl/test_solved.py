@@ -14,11 +14,10 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders import OrderTable
+from mitsuba_diffraction.realtime.glsl.diffracting import pack_table
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.lobes import pack_lobes
-from mitsuba_diffraction.realtime.glsl.methods import method_tables
 from mitsuba_diffraction.realtime.glsl.packing import pack_responses
-from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.solved import order_power, pack_orders
 from tests.realtime.glsl.shaders import DAYLIGHT, difference, paired, probed, shaded
 from tests.support.orders import load, thin_grating
@@ -123,6 +122,5 @@ def test_sheets_are_refused_in_one_line(some_variant: str) -> None:
 
 
 def test_methods_of_the_thesis_refuse_solved_orders(table: OrderTable, some_variant: str) -> None:
-    surface = packed_by(load(table).describe())
     with pytest.raises(DiffractionError, match=r"solved orders.*use method fast"):
-        method_tables("flss", surface)
+        pack_table(load(table).describe(), "flss")

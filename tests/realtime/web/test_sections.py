@@ -33,7 +33,7 @@ def undone(data: bytes, layout: dict[str, Any]) -> NDArray[Any]:
     planes = planes.reshape(layout["columns"] * kind.itemsize, -1)
     bits = np.ascontiguousarray(planes.T).view(f"u{kind.itemsize}")
     bits = np.cumsum(bits, axis=0, dtype=bits.dtype) if layout["differences"] else bits
-    return bits.view(kind).ravel()[: layout["numbers"]]
+    return bits.view(kind).ravel()
 
 
 STORED = [*KINDS.values(), np.float16]
@@ -47,14 +47,10 @@ def test_arrays_come_back_as_they_were(values: NDArray[Any]) -> None:
     np.testing.assert_array_equal(undone(section.data, section.layout), expected.ravel())
 
 
-def test_the_smallest_layout_is_chosen() -> None:
-    rng = np.random.default_rng(1)
-    # every third row resembles the one three before; a ramp has differences alone
-    repeated = np.tile(rng.integers(0, 2**16, (3, 2), np.uint16), (500, 1))
+def test_the_smaller_layout_is_chosen() -> None:
     ramp = np.arange(3000, dtype=np.uint32)[:, None] * 7919
-    assert packed_array(repeated).layout["columns"] % 6 == 0
     assert packed_array(ramp).layout["differences"]
-    noise = rng.integers(0, 2**32, (3000, 1), np.uint32)
+    noise = np.random.default_rng(1).integers(0, 2**32, (3000, 1), np.uint32)
     assert not packed_array(noise).layout["differences"]
 
 

@@ -1,5 +1,4 @@
-// Boundary factor of the material, N' / (1 + ωi·ωo)². The formulas are of optics/ (formulas.py):
-// `begin_boundary` prepares what all wavelengths of a pair share, `boundary_factor` has the rest.
+// Boundary factor of the material, N' / (1 + ωi·ωo)². The formulas are of optics/ (formulas.py).
 // Kirchhoff's factor is the reflectance at the half vector.
 
 #ifdef COATED
@@ -50,40 +49,29 @@ float height_statistic(float q) { return 0.0; }
 
 #endif
 
-// Prepare the values of a pair of directions above the structure that all wavelengths share.
-// outer: their cosines outside of a coat.
+vec3 pair_wi, pair_wo;            // above the structure
+vec2 pair_outer;                  // their cosines outside of a coat
+float pair_square;                // (1 + ωi·ωo)²
+
 void begin_pair(vec3 wi, vec3 wo, vec2 outer)
 {
-#if SURFACE_KIND == DIELECTRIC && defined(COATED)
-    begin_boundary(wi, wo, eta, coat, outer.x, outer.y);
-#elif SURFACE_KIND == DIELECTRIC
-    begin_boundary(wi, wo, eta);
-#elif defined(COATED)
-    begin_boundary(wi, wo, coat, outer.x, outer.y);
+    pair_wi = wi;
+    pair_wo = wo;
+    pair_outer = outer;
+    float edge = max(0.5 * dot(wi + wo, wi + wo), 1e-12);  // not 0 of opposite grazing directions
+    pair_square = edge * edge;
+}
+
+#ifdef COATED
+#define POWER(index, kappa, variance) pair_power(pair_wi, pair_wo, index, kappa, variance, \
+                                                 coat, pair_outer.x, pair_outer.y)
 #else
-    begin_boundary(wi, wo);
+#define POWER(index, kappa, variance) pair_power(pair_wi, pair_wo, index, kappa, variance)
 #endif
-}
-
-#if SURFACE_KIND == DIELECTRIC
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    return boundary_factor(k * z, height_statistic(k * r));
-}
-
-vec3 boundary(float cos_half, float r, float z)
-{
-    vec3 found;
-    for (int n = 0; n < 3; ++n) found[n] = boundary_at(cos_half, channel_wavenumbers[n], r, z);
-    return found;
-}
-
-#else
-
-float boundary_at(float cos_half, float k, float r, float z)
-{
-    return boundary_factor(index_at(k), k * z, height_statistic(k * r));
+    return POWER(index_at(k), k * z, height_statistic(k * r)) / pair_square;
 }
 
 // Boundary factor of each channel: the reflectance under daylight, times the ratio of the model's to
@@ -93,12 +81,10 @@ vec3 boundary(float cos_half, float r, float z)
     vec3 found;
     for (int n = 0; n < 3; ++n) {
         float k = channel_wavenumbers[n];
-        vec2 index = vec2(channel_eta[n], channel_k[n]);
-        found[n] = boundary_factor(index, k * z, height_statistic(k * r))
-                   / max(interface_reflectance(cos_half, index), 1e-20);
+        found[n] = POWER(channel_index(n), k * z, height_statistic(k * r))
+                   / max(interface_reflectance(cos_half, channel_index(n)), 1e-20);
     }
-    return found * reflectance(cos_half);
+    return found * reflectance(cos_half) / pair_square;
 }
 
-#endif
 #endif

@@ -15,25 +15,23 @@ uniform vec2 glossy_ends;       // z and radius of the last entries
 uniform float glossy_scale;     // colour of 1
 uniform float sigma_0;          // of order 0's window, µm
 
-void add_bin(int bin, float weight, inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
+void add_bin(int bin, float weight, inout mat4 sum)
 {
     vec4 low = entry(colours, bin);
     vec4 high = entry(colours, bin + 1);
-    a += weight * vec4(upper_halves(low.x), upper_halves(low.y));
-    b += weight * vec4(upper_halves(low.z), upper_halves(low.w));
-    c += weight * vec4(upper_halves(high.x), upper_halves(high.y));
-    d += weight * vec4(upper_halves(high.z), upper_halves(high.w));
+    sum += weight * mat4(upper_halves(low.x), upper_halves(low.y), upper_halves(low.z),
+                         upper_halves(low.w), upper_halves(high.x), upper_halves(high.y),
+                         upper_halves(high.z), upper_halves(high.w));
 }
 
-void add_azimuth(int start, float azimuths, float turn, float share,
-                 inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
+void add_azimuth(int start, float azimuths, float turn, float share, inout mat4 sum)
 {
     float x = turn * azimuths;
     float lower = min(floor(x), azimuths - 1.0);
     float t = share * min(x - lower, 1.0);
     int bin = 2 * (start + int(lower));
-    add_bin(bin, share - t, a, b, c, d);
-    add_bin(bin + 2, t, a, b, c, d);
+    add_bin(bin, share - t, sum);
+    add_bin(bin + 2, t, sum);
 }
 
 vec3 other_orders(vec2 uv, float squared_radius, float z)
@@ -61,19 +59,19 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     vec3 ring_bins = entry(rings, int(lower)).xyz;
     float azimuths = ring_bins.y;
     int start = interval * bins + int(ring_bins.x);
-    vec4 a = vec4(0.0), b = vec4(0.0), c = vec4(0.0), d = vec4(0.0);
+    mat4 terms = mat4(0.0);  // of red, green and blue, five each
     int next = start + int(azimuths) + 1;  // a ring repeats its first bin at its end
 #ifdef GLANCE  // the nearest alone: a picture that is gone at once
     float count = share > 0.5 ? ring_bins.z : azimuths;
-    add_bin(2 * ((share > 0.5 ? next : start) + int(turn * count + 0.5)), 1.0, a, b, c, d);
+    add_bin(2 * ((share > 0.5 ? next : start) + int(turn * count + 0.5)), 1.0, terms);
 #else
-    add_azimuth(start, azimuths, turn, 1.0 - share, a, b, c, d);
-    add_azimuth(next, ring_bins.z, turn, share, a, b, c, d);
+    add_azimuth(start, azimuths, turn, 1.0 - share, terms);
+    add_azimuth(next, ring_bins.z, turn, share, terms);
 #endif
     vec4 first = vec4(1.0, t, t2, t3);
-    vec3 sum = vec3(dot(a, first) + b.x * t4,
-                    dot(vec4(b.yzw, c.x), first) + c.y * t4,
-                    dot(vec4(c.zw, d.xy), first) + d.z * t4);
+    vec3 sum = vec3(dot(terms[0], first) + terms[1].x * t4,
+                    dot(vec4(terms[1].yzw, terms[2].x), first) + terms[2].y * t4,
+                    dot(vec4(terms[2].zw, terms[3].xy), first) + terms[3].z * t4);
     return sum * (fade * inverse_scale);
 }
 

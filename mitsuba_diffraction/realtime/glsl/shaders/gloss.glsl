@@ -52,3 +52,9 @@ vec3 gloss(vec3 wi, vec3 wo)
                                             / (4.0 * wi.z));
 #endif
 }
+
+// f·cosθ times the light's irradiance, as of a surface that diffracts.
+vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
+{
+    return light_colour[light] * gloss(wi, wo);
+}

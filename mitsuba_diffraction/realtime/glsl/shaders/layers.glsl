@@ -13,6 +13,22 @@ vec2 in_patch(vec3 direction, vec2 rotation)
                 rotation.x * direction.y - rotation.y * direction.x);
 }
 
+#if defined(ORDERS) || defined(ORDER_0)
+
+vec2 mirror_ends = vec2(1.0);     // cosθi and cosθo
+
+// σ₀ of the window on the surface.
+float on_surface(float sigma_0) { return sigma_0 * sqrt(patch_area); }
+
+// C(X_i) C(X_o) of order 0.
+float visible(float k, float sigma_0)
+{
+    vec2 level = mirror_ends * mirror_ends * on_surface(sigma_0);
+    return horizon_correction(level.x, level.y, k);
+}
+
+#endif
+
 const float LOWEST = 1e-6;  // least cosine of a direction, which keeps results finite
 
 #if defined(ORDERS)
@@ -26,7 +42,7 @@ vec3 albedo(vec3 w, vec2 rotation)
 {
     vec3 found = flat_reflectance(w.z);
 #if defined(BENEATH) && !defined(GLANCE)
-    found += albedo_excess(in_patch(w, rotation), w.z);
+    found += of_direction(in_patch(w, rotation), w.z).rgb;
 #endif
     return clamp(found, 0.0, 1.0);
 }

@@ -7,15 +7,6 @@ uniform float sigma;             // standard deviation of the amplitude window, 
 
 const float FAR = 18.0;          // squared distance from a lobe's centre, in its widths, where it is 0
 
-vec2 lobe_ends = vec2(1.0);      // cosθi and cosθo
-
-// C(X_i) C(X_o) of order 0.
-float visible_mirror(float k)
-{
-    vec2 level = lobe_ends * lobe_ends * sigma;
-    return horizon_correction(level.x, level.y, k);
-}
-
 // Lobes of all orders of one wavenumber, from a look-up at it: f without the cosine.
 float orders_at(vec2 uv, float k)
 {
@@ -27,7 +18,7 @@ float orders_at(vec2 uv, float k)
     float sum = 0.0;
     for (int m = int(ceil(place.x - reach)); m <= last; ++m) {
         float lobe = order_lobe(place.x - float(m), place.y, sharpness);
-        if (m == 0) lobe *= visible_mirror(k);
+        if (m == 0) lobe *= visible(k, sigma);
         if (lobe > exp(-FAR)) sum += lobe * efficiency_of(float(m));
     }
     return sum * lobe_peak(k, sigma);
@@ -80,7 +71,7 @@ vec3 all_orders(vec2 uv, int light)
             float k = 2.0 * PI / node.w;
             find_row(node.w);
             sum += node.rgb * (lobe_peak(k, sigma) * exp(-square * sigma * sigma * k * k)
-                               * visible_mirror(k) * efficiency_of(0.0));
+                               * visible(k, sigma) * efficiency_of(0.0));
         }
     return light_colour[light] * sum;
 }
@@ -126,6 +117,6 @@ vec3 all_orders(vec2 uv, int light)
 vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 {
     begin_orders(wi, rotation);
-    lobe_ends = vec2(wi.z, wo.z);
+    mirror_ends = vec2(wi.z, wo.z);
     return wo.z * all_orders(in_patch(wi + wo, rotation), light);
 }

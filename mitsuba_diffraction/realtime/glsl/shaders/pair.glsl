@@ -6,12 +6,9 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     place.xy = in_patch(sum, rotation);
     patch_area = dot(rotation, rotation);
     float area = patch_area * area_factor;
-    float one_plus_dot = 0.5 * dot(sum, sum);
-    float ratio = one_plus_dot / sum.z;
-    float outside = area * ratio * ratio / wi.z;
     vec2 outer = vec2(wi.z, wo.z);
 #ifdef ORDER_0
-    mirror_half = sqrt(min(0.5 * one_plus_dot, 1.0));
+    mirror_half = sqrt(min(0.25 * dot(sum, sum), 1.0));
 #endif
 #ifdef ENERGY_CONSERVING
     float energy = energy_scale(in_patch(wi, rotation), wi.z)
@@ -21,9 +18,10 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     wi = refracted(wi, coat);
     wo = refracted(wo, coat);
     sum = wi + wo;
-    one_plus_dot = 0.5 * dot(sum, sum);
-    ratio = one_plus_dot / sum.z;
-    outside = area * ratio * ratio / wi.z * outer.y / wo.z;
+#endif
+    float one_plus_dot = 0.5 * dot(sum, sum), ratio = one_plus_dot / sum.z;
+    float outside = area * ratio * ratio / wi.z * (outer.y / wo.z);
+#ifdef COATED
     sum.z *= coat;  // κ is larger by the index of the coat
 #endif
     begin_pair(wi, wo, outer);

@@ -37,6 +37,7 @@ int row_at(float k)
 
 float reflectance_at(float cos_i, float k) { return in_row(reflectances, cos_i, row_at(k)).r; }
 vec2 index_at(float k) { return texelFetch(reflectances, ivec2(0, row_at(k)), 0).yz; }
+vec2 channel_index(int n) { return vec2(channel_eta[n], channel_k[n]); }
 
 #else
 
@@ -44,6 +45,7 @@ vec2 index_at(float k) { return texelFetch(reflectances, ivec2(0, row_at(k)), 0)
 uniform float eta;               // index inside over index outside
 float reflectance_at(float cos_i, float k) { return interface_reflectance(cos_i, eta); }
 float index_at(float k) { return eta; }
+float channel_index(int n) { return eta; }
 #else
 float reflectance_at(float cos_i, float k) { return 1.0; }
 #endif
@@ -82,12 +84,6 @@ vec4 of_direction(vec2 tangential, float cosine)
     return on_page(0, cell);
 #endif
 }
-
-#endif
-
-#ifdef BENEATH
-
-vec3 albedo_excess(vec2 tangential, float cosine) { return of_direction(tangential, cosine).rgb; }
 
 #endif
 

@@ -23,17 +23,6 @@ out vec4 fragment;
 
 #if defined(DIFFRACTING) || defined(GLOSS)
 #define LOBES
-
-// f·cosθ of specular reflection or diffraction times the light's irradiance.
-vec3 lobes(vec3 wi, vec3 wo, vec2 rotation, int light)
-{
-#ifdef GLOSS
-    return light_colour[light] * gloss(wi, wo);
-#else
-    return diffraction(wi, wo, rotation, light);
-#endif
-}
-
 #endif
 
 #if defined(BUMP_MAPPED) || defined(NORMAL_MAPPED)
@@ -180,7 +169,7 @@ void main()
         light.w = 0.0;
 #endif
         if (density > 0.0 && light.rgb != vec3(0.0))
-            radiance += light.rgb * lobes(wi, wo, rotation, 0)
+            radiance += light.rgb * diffraction(wi, wo, rotation, 0)
                 * (kept_by_facet(n, smooth_normal, direction) / (density + light.w));
     }
 #endif
@@ -205,7 +194,7 @@ void main()
         float drawn = light_density * square / max(emitted(direction), 1e-6);
         if (light_density != 0.0) share = drawn / max(drawn + lobe_density(wi, wo, rotation), 1e-20);
 #endif
-        added += share * lobes(wi, wo, rotation, i);
+        added += share * diffraction(wi, wo, rotation, i);
 #endif
         float falloff = kept_by_facet(n, smooth_normal, direction);
         if (light_place[i].w > 0.0) falloff /= square;

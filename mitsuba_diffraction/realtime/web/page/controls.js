@@ -5,9 +5,8 @@ const METHODS = { fast: "Colours summed up beforehand", exact: "Every wavelength
 
 const element = (id) => document.getElementById(id);
 
-// Linear sRGB of a colour input's text, and its text.
+// Linear sRGB of a colour input's text.
 const colourOf = (text) => [1, 3, 5].map((n) => parseInt(text.slice(n, n + 2), 16) / 255).map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4));
-const colourText = (colour) => `#${colour.map((x) => Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055)).toString(16).padStart(2, "0")).join("")}`;
 
 class Controls {
   constructor(viewer, fail) {
@@ -33,7 +32,7 @@ class Controls {
     element("turn").value = viewer.turn;
     element("coherence").value = Math.log2(viewer.coherence);
     element("material").value = viewer.material ?? "";
-    if (viewer.pigment) element("pigment").value = colourText(viewer.pigment);
+    if (viewer.pigment) element("pigment").value = viewer.pigment;
     element("shadows").checked = viewer.shadows;
     element("kind").value = viewer.lights.kind;
     this.label();
@@ -222,7 +221,7 @@ class Controls {
     Object.assign(element("heights"), { min, max });
     slide("heights", (value) => (viewer.heights = 2 ** Number(value)));
     slide("turn", (value) => (viewer.turn = Number(value)));
-    slide("pigment", (value) => (viewer.pigment = colourOf(value)));
+    slide("pigment", (value) => (viewer.pigment = value));
     element("pigment").parentElement.hidden = !header.surfaces.some(({ pigmented }) => pigmented);
     element("coherence").parentElement.hidden = !header.methods.includes("exact");
     element("coherence").addEventListener("input", () => this.change({ coherence: 2 ** Number(element("coherence").value) }));

@@ -18,7 +18,7 @@ const ARRAYS = { Uint8Array, Int16Array, Uint16Array, Uint32Array, Float32Array 
 const BLOCK = 1024; // rows at a time, which processors cache
 
 // Decode planes of bytes to rows, and differences of bits to bits.
-function restored(planes, { kind, numbers, columns, differences }) {
+function restored(planes, { kind, columns, differences }) {
   const size = ARRAYS[kind].BYTES_PER_ELEMENT, width = columns * size, rows = planes.length / width;
   const bytes = new Uint8Array(planes.length);
   for (let first = 0; first < rows; first += BLOCK)
@@ -30,7 +30,7 @@ function restored(planes, { kind, numbers, columns, differences }) {
     const bits = new { 1: Uint8Array, 2: Uint16Array, 4: Uint32Array }[size](bytes.buffer);
     for (let i = columns; i < bits.length; ++i) bits[i] += bits[i - columns]; // wraps around
   }
-  return new ARRAYS[kind](bytes.buffer, 0, numbers);
+  return new ARRAYS[kind](bytes.buffer);
 }
 
 class Data {

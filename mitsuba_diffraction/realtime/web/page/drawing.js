@@ -1,5 +1,11 @@
 // WebGL programs, textures and framebuffers, and drawing with them.
 
+// Setters of uniforms by their types; others are numbers of textures, integers and conditions.
+const SETTERS = {
+  FLOAT: "1f", FLOAT_VEC2: "2fv", FLOAT_VEC3: "3fv", FLOAT_VEC4: "4fv", INT_VEC2: "2iv", INT_VEC3: "3iv",
+  FLOAT_MAT3: "Matrix3fv", FLOAT_MAT4: "Matrix4fv",
+};
+
 // Program that the driver compiles beside the page's scripts, which only `finish` waits for.
 class Program {
   constructor(gl, vertex, fragment) {
@@ -27,7 +33,8 @@ class Program {
     for (let n = 0; n < count; ++n) {
       const { name, type } = gl.getActiveUniform(this.program, n);
       const location = gl.getUniformLocation(this.program, name);
-      this.uniforms[name.replace("[0]", "")] = { location, type };
+      const kind = Object.keys(SETTERS).find((each) => gl[each] === type);
+      this.uniforms[name.replace("[0]", "")] = { location, setter: `uniform${SETTERS[kind] ?? "1i"}` };
     }
   }
 
@@ -42,16 +49,9 @@ class Program {
     const { gl } = this;
     for (const [name, value] of Object.entries(values)) {
       if (!(name in this.uniforms)) continue;
-      const { location, type } = this.uniforms[name];
-      if (type === gl.FLOAT) gl.uniform1f(location, value);
-      else if (type === gl.FLOAT_VEC2) gl.uniform2fv(location, value);
-      else if (type === gl.FLOAT_VEC3) gl.uniform3fv(location, value);
-      else if (type === gl.FLOAT_VEC4) gl.uniform4fv(location, value);
-      else if (type === gl.INT_VEC2) gl.uniform2iv(location, value);
-      else if (type === gl.INT_VEC3) gl.uniform3iv(location, value);
-      else if (type === gl.FLOAT_MAT3) gl.uniformMatrix3fv(location, false, value);
-      else if (type === gl.FLOAT_MAT4) gl.uniformMatrix4fv(location, false, value);
-      else gl.uniform1i(location, value);
+      const { location, setter } = this.uniforms[name];
+      if (setter.includes("Matrix")) gl[setter](location, false, value);
+      else gl[setter](location, value);
     }
   }
 
@@ -89,9 +89,8 @@ async function uploadTexture(gl, data, entry) {
       single: { internal: [gl.R32F, gl.RG32F, gl.RGBA32F], type: gl.FLOAT },
     }[entry.kind];
     const format = [gl.RED, gl.RG, gl.RGBA][n];
-    const numbers = content.subarray(0, width * height * channels);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, numbers);
+    gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, content);
   }
   const [filter, wrap] = entry.smooth ? [gl.LINEAR, gl.REPEAT] : [gl.NEAREST, gl.CLAMP_TO_EDGE];
   for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, filter);
@@ -173,7 +172,11 @@ class Drawing {
     this.spectra = light.spectra === null ? null : await data.array(light.spectra);
     this.responses = texels(gl, gl.RGBA32F, this.daylight.length / 4, RESPONSES);
     this.empty = gl.createVertexArray();
-    this.around = header.around && (await Surroundings.load(gl, header, data));
+    if (!header.around) return;
+    const { parts, lobes, background } = header.around;
+    this.around = await Part.load(gl, data, parts);
+    this.lobes = await Promise.all(lobes.map((one) => Part.load(gl, data, one)));
+    this.background = background && new Program(gl, whole, background);
   }
 
   async loadMeshes() {
@@ -260,7 +263,10 @@ class Drawing {
       if (surface.lamp && !view.around) return; // lamps belong to the scene's light
       const program = this.dressed(surface, view, main);
       program.texture("shadow_map", this.shadows[view.moving ? "coarse" : "fine"].texture);
-      if (view.looksUp) this.around.use(program, surface.table);
+      if (view.looksUp) {
+        this.around.use(program);
+        this.lobes[surface.table]?.use(program);
+      }
       program.set({
         ...view.uniforms,
         wavenumbers: this.header.light.wavenumbers,
@@ -283,9 +289,23 @@ class Drawing {
     gl.enable(gl.DEPTH_TEST);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    if (view.around && view.bright && this.around.background) this.around.draw(view, this);
+    if (view.around && view.bright && this.background) this.drawBackground(view);
     this.drawSurfaces(view, "surface");
     gl.disable(gl.SCISSOR_TEST);
+  }
+
+  // Draw the environment.
+  drawBackground({ uniforms, matrix, up, width, height }) {
+    const { gl, background } = this;
+    gl.disable(gl.DEPTH_TEST);
+    background.use();
+    this.around.use(background);
+    background.set({
+      ...uniforms, from_clip: columnMajor(inverse(matrix)), picture_size: [width, height],
+      horizon: up, // a sky that is dark below is mirrored at the horizon
+    });
+    this.triangle();
+    gl.enable(gl.DEPTH_TEST);
   }
 
   full(frame, width, height) {
@@ -327,7 +347,7 @@ class Drawing {
     this.shown.use();
     this.shown.set({
       sample_count: view.preview ? 1 : count, exposure,
-      background: view.around && this.around.background ? DARK : this.header.background.map((x) => Math.max(x * exposure, 0)),
+      background: view.around && this.background ? DARK : this.header.background.map((x) => Math.max(x * exposure, 0)),
     });
     this.shown.texture("samples", view.preview ? this.held.texture : this.sums[half ? 1 : 0].texture);
     this.full(null, width, height);

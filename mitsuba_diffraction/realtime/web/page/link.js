@@ -15,7 +15,7 @@ function viewToText(viewer) {
   };
   if (viewer.turn) found.turn = viewer.turn;
   if (viewer.coherence !== 1) found.coherence = Number(Math.log2(viewer.coherence).toFixed(2));
-  if (viewer.pigment) found.pigment = colourText(viewer.pigment).slice(1);
+  if (viewer.pigment) found.pigment = viewer.pigment.slice(1);
   if (viewer.material !== null) found.material = viewer.header.materials[viewer.material].name;
   if (lights.own.length) found.places = numbers(lights.own.flatMap(({ place }) => place));
   if (viewer.wavelength !== null) found.nm = viewer.wavelength;
@@ -45,7 +45,7 @@ function textToView(text, viewer) {
   viewer.heights = 2 ** number("heights", ...header.octaves);
   viewer.turn = number("turn", -90, 90);
   viewer.coherence = header.methods.includes("exact") ? 2 ** number("coherence", -3, 0) : 1;
-  viewer.pigment = /^[0-9a-f]{6}$/.test(given.get("pigment") ?? "") ? colourOf(`#${given.get("pigment")}`) : null;
+  viewer.pigment = /^[0-9a-f]{6}$/.test(given.get("pigment") ?? "") ? `#${given.get("pigment")}` : null;
   const material = header.materials.findIndex(({ name }) => name === given.get("material"));
   viewer.material = material < 0 ? null : material;
   viewer.shadows = given.get("shadows") !== "0";

@@ -12,6 +12,10 @@ const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\
 // uniforms of a light without shadows
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
 
+// Light of samples that look up the surroundings, and the numbers of each, like glsl/renderer.py.
+const WHITE = { place: [0, 0, 1, 0], colour: [1, 1, 1], axis: DARK, cone: [0, 0], spectrum: -1, density: 0 };
+const drawnNumbers = (n) => [0.5 + Math.sqrt(1.25), Math.sqrt(19)].map((step) => (0.5 + (n + 1) * step) % 1);
+
 // The scene as it is: the state that the panel changes.
 const PLAIN = {
   wavelength: null, // of monochromatic light, nm
@@ -21,7 +25,7 @@ const PLAIN = {
   exposure: 1,
   heights: 1,
   turn: 0,          // degrees by which patches are turned
-  pigment: null,    // linear sRGB in place of the pigments beneath
+  pigment: null,    // colour (#rrggbb) in place of the pigments beneath
 };
 
 class Viewer {
@@ -146,7 +150,7 @@ class Viewer {
     const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye };
     if (this.wavelength !== null) uniforms.wavenumber = (2e3 * Math.PI) / this.wavelength;
     const turn = (this.turn * Math.PI) / 180, { material, coherence, pigment } = this;
-    const base = material !== null && this.header.materials[material].absorbs ? DARK : pigment;
+    const base = material !== null && this.header.materials[material].absorbs ? DARK : pigment && colourOf(pigment);
     Object.assign(uniforms, { patch_turn: [Math.cos(turn), Math.sin(turn)], live_pigment: base ? [...base, 1] : [0, 0, 0, 0] });
     return { matrix, up: this.camera.up, method: this.drawn, heights: this.heights, material, coherence, uniforms };
   }
