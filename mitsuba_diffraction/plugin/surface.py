@@ -15,7 +15,7 @@ from . import parameters as read
 from .arithmetic import plain
 from .base import SurfaceBSDF
 from .boundary import KIRCHHOFF, Boundary, boundary_of, order_0
-from .conductors import tabulated_range
+from .conductors import is_tabulated
 from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
@@ -287,7 +287,7 @@ class DiffractingSurface(SurfaceBSDF):
             lateral_scale=self.lateral_scale.quantity,
             kind=material.kind,
             index=None if material.kind is Feature.MIRROR else material.at,
-            material=material.name if tabulated_range(material.name) else "",
+            material=material.name if is_tabulated(material.name) else "",
             layer=structure.layer,
             film_varies=isinstance(structure, UnderFilm) and bool(structure.thickness.texture),
             model=str(self.boundary),
