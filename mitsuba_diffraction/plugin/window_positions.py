@@ -32,7 +32,7 @@ TILINGS = ("periodic", "random")
 _MOST_CORNERS = 2.0**22
 
 
-@dataclass(frozen=True)
+@dataclass  # not frozen: Dr.Jit assigns to it in loops
 class PlacedWindow:
     """A window at a point of the surface, by the phases that it gives to orders.
 
