@@ -262,15 +262,11 @@ class Diffraction(DiffractingSurface):
     ) -> tuple[Spectrum, Float]:
         """See `SurfaceBSDF.diffracted`."""
         pair = self.pair(site, wo, active)  # eq. 1
-        drawing = self._drawing_scale(site)
-        if kinds == "d":
-            density = self.power.density(pair.outer, drawing, site.si)
-            return mi.Spectrum(0.0), with_even_share(density)
         # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
-        if kinds == "v":
-            power, density = self.power.power(pair, site.scale, site.si), mi.Float(0.0)
-        else:
-            power, density = self.power.both(pair, site.scale, drawing, site.si)
+        drawing = self._drawing_scale(site)
+        power, density = self.power.answers(pair, site.scale, drawing, site.si, kinds)
+        if "v" not in kinds:
+            return mi.Spectrum(0.0), with_even_share(density)
         # Eq. 4 to 10: times N' of the material and the rest
         return self.light(ctx, site, pair, power, active), with_even_share(density)
 

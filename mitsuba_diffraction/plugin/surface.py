@@ -10,11 +10,12 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from ..optics.boundary import model_of
 from ..tables.build.derivatives import missing
 from . import parameters as read
 from .arithmetic import plain
 from .base import SurfaceBSDF
-from .boundary import KIRCHHOFF, Boundary, boundary_of, order_0
+from .boundary import Boundary, order_0
 from .conductors import is_tabulated
 from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
@@ -95,7 +96,8 @@ class DiffractingSurface(SurfaceBSDF):
         self.power = self._power()
         material = read.layered(props, material, self.table)
         read.warn_of_film(material, self.table, largest)
-        self.boundary, self.fresnel = boundary_of(model, material, self.table.roughness), material
+        self.boundary = Boundary(model_of(model), material).on(self.table.roughness)
+        self.fresnel = material
         # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
         self.area_factor = 4.0 * dr.pi * self.table.sigma**2
 
@@ -191,7 +193,7 @@ class DiffractingSurface(SurfaceBSDF):
         """See `SurfaceBSDF.site_at`."""
         scale = self.height_scale.at(si, active)
         known = self.power.bounded(si)
-        return Site(known, self.frame_at(si, active), scale, self.power.wavenumbers(known), si)
+        return Site(known, self.frame_at(si, active), scale, self.power.wavenumbers(known))
 
     def frame_at(self, si: Interaction, active: Mask) -> PatchFrame:
         """Return the patch as it lies at points of the surface."""
@@ -244,7 +246,7 @@ class DiffractingSurface(SurfaceBSDF):
         treated = heights.shape != given.shape or np.ptp(heights - given) > rounding
         lacks = {
             "a spectral or mono variant": mi.is_rgb,
-            "model=kirchhoff": self.boundary.model.name != KIRCHHOFF.name,
+            "model=kirchhoff": self.boundary.model.name != "kirchhoff",
             "energy_conserving=false": self.energy_conserving,
             "no BSDF beneath": self.nested is not None,
             "heights that no crop, level or clip changes": treated,
