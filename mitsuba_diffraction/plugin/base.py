@@ -21,7 +21,6 @@ from .arithmetic import clip
 from .directions import Site
 from .parameter_changes import (
     Changeable,
-    ObjectValues,
     arrays_within,
     check_parameters,
     marks,
@@ -170,7 +169,7 @@ class SurfaceBSDF(PluginBSDF):
     def ready(self) -> None:
         """Finish loading (`PluginBSDF.ready`); the nested BSDF is the last parameter."""
         if self.nested is not None:
-            self.parameters.append(ObjectValues("nested", self.nested))
+            self.parameters.append(Changeable("nested", self.nested))
         super().ready()
 
     def components(self) -> list[int]:
