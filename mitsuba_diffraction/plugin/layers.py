@@ -213,6 +213,7 @@ class UnderFilm(Material):
         self.film, self._fixed = film, mi.Float(wavelength)
         dr.make_opaque(self._fixed)
         self._range, self.thickness = wavelength_range, thickness
+        self.varying = thickness if thickness.texture else None
         absorption = Varying("film_k", k, *INDEX_PARTS["k"], advice=": the film's index is n + ik")
         self.changeable = (*material.changeable, *film.changeable, absorption, thickness)
         self.k = absorption.value

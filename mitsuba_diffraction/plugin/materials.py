@@ -53,6 +53,9 @@ class Material:
     absorbs : whether light that is not reflected is absorbed, and none goes beneath.
     tint : columns of `optics.colour.metal_tint` in RGB variants, of a tabulated metal.
     layer : FILM or STACK, of layers over a material; else None.
+    varying : `layers.Thickness` of a film by a texture, else None.
+    reflects_all : whether there is total reflection: the medium above is the denser one.
+    sums : `layers.Channels` of a film in RGB variants, else None.
     material : the material beneath layers, else None.
     """
 
@@ -62,6 +65,9 @@ class Material:
     absorbs = False
     tint: list[Colour] | None = None
     layer: Feature | None = None
+    varying: Any = None
+    reflects_all = False
+    sums: Any = None
     material: Material | None = None
 
     def indices(self, si: Interaction, active: Mask) -> list[Any]:
@@ -143,7 +149,6 @@ class Dielectric(Material):
     Attributes
     ----------
     eta : the ratio.
-    reflects_all : whether there is total reflection: the medium above is the denser one.
     """
 
     def __init__(

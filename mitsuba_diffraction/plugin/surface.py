@@ -22,7 +22,7 @@ from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
 from .height_derivatives import MOST_DIFFERENTIABLE, DifferentiableHeights
-from .layers import UnderFilm, warn_of_film
+from .layers import warn_of_film
 from .loops import only_in
 from .materials import Material, tinted
 from .power import PowerModel, power_model
@@ -290,7 +290,7 @@ class DiffractingSurface(SurfaceBSDF):
             index=None if material.kind is Feature.MIRROR else material.at,
             material=material.name if is_tabulated(material.name) else "",
             layer=structure.layer,
-            film_varies=isinstance(structure, UnderFilm) and bool(structure.thickness.texture),
+            film_varies=structure.varying is not None,
             model=str(self.boundary),
             transmits=self.transmits,
         )
