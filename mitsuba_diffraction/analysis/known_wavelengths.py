@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Real
 from ..errors import DiffractionError
 from ..optics.materials import PERFECT, lets_light_through, material_named
-from ..plugin.conductors import tabulated_range, unknown_conductor
+from ..plugin.conductors import tabulated_index
 from ..plugin.description import Surface
 from ..plugin.parameters import refusal
 from ..plugin.pigment import pigment_range
@@ -23,12 +23,10 @@ def known_range(material: str | None, pigment: str | None = None) -> tuple[float
     or the pigment cannot be read.
     """
     name = PERFECT if material is None else material_named(material)
-    limits = None
+    first, last = 0.0, math.inf
     if isinstance(name, str) and name != PERFECT:
-        limits = tabulated_range(name)
-        if limits is None:
-            raise DiffractionError(unknown_conductor(name))
-    first, last = limits or (0.0, math.inf)
+        nodes, _ = tabulated_index(name)
+        first, last = float(nodes[0]), float(nodes[-1])
     least, most = pigment_range(pigment)
     if pigment not in (None, "none") and material is not None and not lets_light_through(material):
         choice = f"material={material}, which lets no light through"

@@ -19,7 +19,7 @@ from ..heights.source import notes_line
 from ..optics.display import VIEWS
 from ..retired import REPLACED
 from ..settings import SETTINGS, TableSettings, checked
-from ..tables.build.checks import check_units, check_window, period_of, warnings_of
+from ..tables.build.checks import check_units, check_window, warnings_of
 from ..thesis.methods import NAMES
 from .report import Figures
 from .values import NUMBERS, limits, path_ending_in, whole_number
@@ -316,7 +316,7 @@ def table_warnings(fields: Sequence[HeightField], settings: TableSettings) -> li
     how = resolved(settings, fields)
     try:
         check_units(fields)
-        check_window(period_of(fields[0], how), how)
+        check_window(fields[0], how)
     except DiffractionError as error:
         doubts = [line for field in fields for line in field.validity(settings.wavelength_range)]
         asked = {units for field in fields if (units := units_warning(field))}

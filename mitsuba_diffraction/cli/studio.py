@@ -12,7 +12,7 @@ from ..errors import DiffractionError, quoted
 from ..files import MESHES
 from ..heights.lengths import numbers_of
 from ..optics.materials import METALS, TISSUES
-from ..plugin.conductors import tabulated_range
+from ..plugin.conductors import is_tabulated
 from ..scene.orbit import ORBIT
 from ..scene.parameters import CLAMP, parameters_of
 from ..scene.pictures import check_panorama
@@ -108,4 +108,4 @@ def _material(args: argparse.Namespace) -> dict[str, str]:
 def _is_metal(text: str) -> bool:
     """Whether a text names a conductor, by symbol or plain name."""
     name = METALS.get(text.lower(), text)
-    return name not in TISSUES and tabulated_range(name) is not None
+    return name not in TISSUES and is_tabulated(name)

@@ -10,7 +10,7 @@ base            `PluginBSDF`, answers, parameters and their changes; `SurfaceBSD
 surface         `DiffractingSurface`, a table with factors, orientation and power
 description     record of a surface that shaders, OSL, maps and plans read
 parameters      parameters of a scene, read from Mitsuba's Properties and checked
-properties      words, flags and numbers from them, refused by name
+properties      words, flags, numbers and files from them, refused by name
 varying         numbers over a surface: one for all, a texture or a mesh attribute
 textures        orientation that varies, and checks of textures
 parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF

@@ -21,7 +21,6 @@ from .arithmetic import clip
 from .directions import Site
 from .parameter_changes import (
     Changeable,
-    ObjectValues,
     arrays_within,
     check_parameters,
     marks,
@@ -170,7 +169,7 @@ class SurfaceBSDF(PluginBSDF):
     def ready(self) -> None:
         """Finish loading (`PluginBSDF.ready`); the nested BSDF is the last parameter."""
         if self.nested is not None:
-            self.parameters.append(ObjectValues("nested", self.nested))
+            self.parameters.append(Changeable("nested", self.nested))
         super().ready()
 
     def components(self) -> list[int]:
@@ -229,13 +228,16 @@ class SurfaceBSDF(PluginBSDF):
     ) -> Sequence[Any]:
         """See `PluginBSDF.answers`."""
         active = mi.Mask(active)
-        value, density = self.evaluated(ctx, self.site_at(si, active), wo, active, kinds)
+        value, density = self.evaluated(ctx, si, self.site_at(si, active), wo, active, kinds)
         return [value if kind == "v" else density for kind in kinds]
 
     def evaluated(
-        self, ctx: Context, site: Site, wo: Vector3f, active: Mask, kinds: str
+        self, ctx: Context, si: Interaction, site: Site, wo: Vector3f, active: Mask, kinds: str
     ) -> tuple[Spectrum, Float]:
-        """Return value and density, nested BSDF included; only those asked for are meant."""
+        """Return value and density, nested BSDF included; only those asked for are meant.
+
+        si : for the nested BSDF; the site has its wavelengths within the table's.
+        """
         if self.transmits:
             return self.diffracted(ctx, site, wo, active, kinds)
         active = (
@@ -246,7 +248,7 @@ class SurfaceBSDF(PluginBSDF):
         if diffracts:
             value, density = self.diffracted(ctx, site, wo, active, kinds)
         if nested is not None:
-            below = ask(self.nested, nested, site.nested_si, wo, active, kinds)
+            below = ask(self.nested, nested, si, wo, active, kinds)
             if "v" in kinds:
                 value += mi.Spectrum(self.beneath(site, wo, active)) * _valid(below[0])
             if "d" in kinds:
@@ -287,7 +289,7 @@ class SurfaceBSDF(PluginBSDF):
             drawn = self.draw(ctx, site, sample1, sample2)
             result.wo = drawn if nested is None else dr.select(chosen, result.wo, drawn)
         smooth = dr.select(delta, False, active)
-        value, pdf = self.evaluated(ctx, site, result.wo, smooth, "vd")
+        value, pdf = self.evaluated(ctx, si, site, result.wo, smooth, "vd")
         value = value / dr.select(pdf > LEAST_DENSITY, pdf, 1.0)
         if nested is not None:
             beneath = mi.Spectrum(self.beneath(site, result.wo, delta))

@@ -26,7 +26,6 @@ from ..optics.boundary import (
     Jones,
     Model,
     geometry,
-    model_of,
     power,
 )
 from ..optics.coat import (
@@ -39,13 +38,10 @@ from ..optics.coat import (
 from ..optics.fresnel import reflectance
 from ..optics.mirror import mirror
 from .arithmetic import clip, index_of, maximum
-from .directions import CoatedPair, Pair, TablePoint
+from .directions import CoatedPair, Pair, Place
 from .materials import Material, Perfect
 from .memory import index_between, read_record, upload
 from .types import Float, Number, Spectrum, Vector3f
-
-#: The model of a perfect reflector, which has no index.
-KIRCHHOFF = model_of("kirchhoff")
 
 
 class HeightStatistic:
@@ -58,20 +54,19 @@ class HeightStatistic:
         # A node and the next one side by side, so that one packet load fetches both
         self._nodes = upload(mi.Float, np.stack([nodes[:-1], nodes[1:]], axis=1))
 
-    def at(
-        self, pair: Pair | TablePoint, height_scale: Float, wavenumbers: list[Float]
-    ) -> list[Heights]:
+    def at(self, place: Place, height_scale: Float, wavenumbers: list[Float]) -> list[Heights]:
         """Return κ and the statistic for each channel."""
+        uv, w = place
         # An order of no frequency to speak of has the first node's value, as q → 0
-        squared = maximum(dr.squared_norm(pair.uv), 1e-20)
+        squared = maximum(dr.squared_norm(uv), 1e-20)
         start = dr.fma(dr.log2(squared), 0.5 * NODES_PER_OCTAVE, -self._first * NODES_PER_OCTAVE)
-        scaled_w = pair.w * height_scale
+        scaled_w = w * height_scale
         heights = []
         for k in wavenumbers:
-            place = dr.fma(dr.log2(k), NODES_PER_OCTAVE, start)
-            lower = index_between(dr.floor(place), 0.0, self._last)
+            node = dr.fma(dr.log2(k), NODES_PER_OCTAVE, start)
+            lower = index_between(dr.floor(node), 0.0, self._last)
             low, high = read_record(self._nodes, index_of(lower), 2)
-            variance = dr.lerp(low, high, clip(place - lower, 0.0, 1.0))
+            variance = dr.lerp(low, high, clip(node - lower, 0.0, 1.0))
             heights.append(Heights(scaled_w * k, variance))
         return heights
 
@@ -110,45 +105,33 @@ class Boundary:
         if isinstance(self.material, Perfect):
             return mi.depolarizer(mi.UnpolarizedSpectrum(dr.square(pair.one_plus_dot)))
         light = LightPath.of(pair, mode)
-        heights = self.heights(pair, height_scale, self.material.wavenumbers(wavenumbers))
+        waves = self.material.wavenumbers(wavenumbers)
+        heights = self.heights((pair.uv, pair.w), height_scale, waves)
         channels = _side_by_side(indices, heights)
         if self.model.power is not None and not (mi.is_polarized or light.passed):
             powers = [self.model.power(light.pair, index) for index, _ in channels]
             return self.material.channels(powers)
-        matrices = [self.model.jones(light.pair, *channel) for channel in channels]
-        return self._of_matrices(light, matrices, [index for index, _ in channels])
-
-    def _of_matrices(
-        self, light: LightPath, matrices: list[Jones], indices: list[Number]
-    ) -> Spectrum:
-        """Return ½ Σ|J|² outside of a coat, or the Mueller matrix, for each channel."""
-        results: list[Any] = matrices
+        results: list[Any] = [self.model.jones(light.pair, *channel) for channel in channels]
         if light.passed:
             outside = transmitted if mi.is_polarized else coated_power
             results = [
                 outside(jones, light.pair, index, *light.passed)
-                for jones, index in zip(matrices, indices, strict=True)
+                for jones, (index, _) in zip(results, channels, strict=True)
             ]
         elif not mi.is_polarized:
-            results = [power(jones) for jones in matrices]
+            results = [power(jones) for jones in results]
         return light.mueller(results) if mi.is_polarized else self.material.channels(results)
 
     def heights(
-        self, pair: Pair | TablePoint, height_scale: Float, wavenumbers: list[Float]
+        self, place: Place, height_scale: Float, wavenumbers: list[Float]
     ) -> list[Heights | None]:
         """Return the heights that the model sees: for each channel, or one None."""
         if self.statistic is None:
             return [None]
-        return [*self.statistic.at(pair, height_scale, wavenumbers)]
+        return [*self.statistic.at(place, height_scale, wavenumbers)]
 
     def __str__(self) -> str:
         return self.model.name
-
-
-def boundary_of(model: str, material: Material, roughness: RoughnessTable) -> Boundary:
-    """Return the boundary of a model; a perfect reflector, without an index, has Kirchhoff's."""
-    chosen = KIRCHHOFF if isinstance(material, Perfect) else model_of(model)
-    return Boundary(chosen, material).on(roughness)
 
 
 def order_0(

@@ -22,7 +22,7 @@ Array = NDArray[Any]
 _FILES = (".csv", ".txt", ".yml", ".yaml", ".agf")
 
 
-def unknown_conductor(material: str) -> str:
+def _unknown(material: str) -> str:
     """Return the message on an unknown conductor, with the names of known ones."""
     if Path(material.partition(":")[0]).suffix.lower() in _FILES:
         return (
@@ -53,12 +53,9 @@ def _tabulated() -> set[str]:
     return {file.name.removesuffix(".eta.spd") for file in _folder().glob("*.eta.spd")}
 
 
-def tabulated_range(material: str) -> tuple[float, float] | None:
-    """Return the first and the last wavelength, nm, of a material's table, if there is one."""
-    if (known := _known(material)) is None:
-        return None
-    nodes, _ = known
-    return float(nodes[0]), float(nodes[-1])
+def is_tabulated(material: str) -> bool:
+    """Return whether a material, conductor or tissue, has a table."""
+    return material in TISSUES or material in _tabulated()
 
 
 def tabulated_index(material: str) -> tuple[Array, Array]:
@@ -66,9 +63,14 @@ def tabulated_index(material: str) -> tuple[Array, Array]:
 
     Raises a DiffractionError if no table has that name.
     """
-    if (known := _known(material)) is None:
-        raise DiffractionError(unknown_conductor(material))
-    return known
+    if tissue := TISSUES.get(material):
+        return tissue.nodes, tissue.index(tissue.nodes)
+    if material not in _tabulated():
+        raise DiffractionError(_unknown(material))
+    files = (_folder() / f"{material}.{part}.spd" for part in ("eta", "k"))
+    what = "wavelengths in nm and values"
+    (nodes, eta), k = (read_columns(file).finite((0, 1), what).T for file in files)
+    return nodes, np.asarray(eta + 1j * np.interp(nodes, *k))
 
 
 #: Wavelengths, nm, between which spectra are constant beyond their nodes.
@@ -98,18 +100,6 @@ def extended(nodes: Array, values: Array) -> tuple[Array, Array]:
     """Return a spectrum that is constant beyond its nodes (nm), where Mitsuba has 0."""
     ends = np.union1d(nodes, [x for x in _ENDS if not nodes[0] <= x <= nodes[-1]])
     return ends, np.interp(ends, nodes, values)
-
-
-def _known(material: str) -> tuple[Array, Array] | None:
-    """Return wavelengths in nm and n + ik of a material that has a table, else None."""
-    if tissue := TISSUES.get(material):
-        return tissue.nodes, tissue.index(tissue.nodes)
-    if material not in _tabulated():
-        return None
-    files = (_folder() / f"{material}.{part}.spd" for part in ("eta", "k"))
-    what = "wavelengths in nm and values"
-    (nodes, eta), k = (read_columns(file).finite((0, 1), what).T for file in files)
-    return nodes, np.asarray(eta + 1j * np.interp(nodes, *k))
 
 
 def _folder() -> Path:

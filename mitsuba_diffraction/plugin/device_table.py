@@ -223,7 +223,8 @@ class DeviceTable:
             return total
 
         steps = [_along(window.steps[0], across.all()) for window in windows]
-        phases = Phases.of(windows, across, along)
+        start = [dr.fma(across.first, w.turn.x, along.first * w.turn.y) for w in windows]
+        phases = Phases(along, list(windows), start)
         nothing = [mi.Float(0.0), mi.Float(0.0)]
         return self._over_rows(first, phases, add_row, (steps, weights), nothing)
 
@@ -300,46 +301,32 @@ class Phases:
     Attributes
     ----------
     rows : weights of the rows.
-    start, step : of each window, turns of the first tap and from one row to the next.
-    rotation : of each window, the step's (cos, sin).
-    weight : of each window.
+    windows : positions of the windows.
+    start : of each window, turns of the first tap.
     """
 
     rows: Gaussians
+    windows: list[PlacedWindow]
     start: list[Float]
-    step: list[Float]
-    rotation: list[Rotation]
-    weight: list[Float]
-
-    @classmethod
-    def of(cls, windows: Sequence[PlacedWindow], across: Gaussians, along: Gaussians) -> Phases:
-        """Make the phases of windows, for taps along both axes."""
-        return cls(
-            along,
-            [dr.fma(across.first, w.turn.x, along.first * w.turn.y) for w in windows],
-            [w.turn.y for w in windows],
-            [w.steps[1] for w in windows],
-            [w.weight for w in windows],
-        )
 
     def at(self, n: Float | int) -> list[Rotation]:
         """Return the rotations of row n."""
         row, rotations = self.rows.at(n), []
-        for start, step, weight in zip(self.start, self.step, self.weight, strict=True):
-            sin, cos = _sincos(start + dr.round(-start) + step * n)
-            rotations.append((cos * (weight * row), sin * (weight * row)))
+        for start, window in zip(self.start, self.windows, strict=True):
+            sin, cos = _sincos(start + dr.round(-start) + window.turn.y * n)
+            rotations.append((cos * (window.weight * row), sin * (window.weight * row)))
         return rotations
 
     def all(self) -> list[list[Rotation]]:
         """Return the rotations of all rows."""
         phases = []
-        for start, weight in zip(self.start, self.weight, strict=True):
+        for start, window in zip(self.start, self.windows, strict=True):
             sin, cos = _sincos(start)
-            phases.append((cos * weight, sin * weight))
+            phases.append((cos * window.weight, sin * window.weight))
         rotations = []
         for row in self.rows.all():
             rotations.append([(cos * row, sin * row) for cos, sin in phases])
-            phases = [_summed(p, step) for p, step in zip(phases, self.rotation, strict=True)]
+            phases = [_summed(p, w.steps[1]) for p, w in zip(phases, self.windows, strict=True)]
         return rotations
 
 

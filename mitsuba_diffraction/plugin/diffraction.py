@@ -203,7 +203,7 @@ from .arithmetic import plain
 from .description import Feature, Surface, unscaled
 from .directions import SHADOWINGS, CoatedPair, Pair, Site
 from .energy import EnergyModel, reflectors_of
-from .layers import UnderCoat, UnderFilm
+from .layers import UnderCoat
 from .properties import choice
 from .sampling import direction_of, drawn, with_even_share
 from .surface import DiffractingSurface
@@ -248,10 +248,7 @@ class Diffraction(DiffractingSurface):
             partial(reflectors_of, self.boundary, self.coat),
             conserving=self.energy_conserving,
             beneath=nested is not None,
-            thickness=material.thickness
-            if isinstance(material := self.boundary.material, UnderFilm)
-            and material.thickness.texture
-            else None,
+            thickness=self.boundary.material.varying,
         )
         self.ready()
 
@@ -262,15 +259,11 @@ class Diffraction(DiffractingSurface):
     ) -> tuple[Spectrum, Float]:
         """See `SurfaceBSDF.diffracted`."""
         pair = self.pair(site, wo, active)  # eq. 1
-        drawing = self._drawing_scale(site)
-        if kinds == "d":
-            density = self.power.density(pair.outer, drawing, site.si)
-            return mi.Spectrum(0.0), with_even_share(density)
         # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
-        if kinds == "v":
-            power, density = self.power.power(pair, site.scale, site.si), mi.Float(0.0)
-        else:
-            power, density = self.power.both(pair, site.scale, drawing, site.si)
+        drawing = self._drawing_scale(site)
+        power, density = self.power.answers(pair, site.scale, drawing, site.si, kinds)
+        if "v" not in kinds:
+            return mi.Spectrum(0.0), with_even_share(density)
         # Eq. 4 to 10: times N' of the material and the rest
         return self.light(ctx, site, pair, power, active), with_even_share(density)
 
@@ -336,13 +329,9 @@ class Diffraction(DiffractingSurface):
 
     def kernel_constants(self) -> tuple[object, ...]:
         """See `PluginBSDF.kernel_constants`."""
-        material: Any = self.boundary.material
-        other_kernels = (
-            getattr(material, "reflects_all", False),
-            getattr(material, "sums", None),
-            material.tint is None,
-            str(material.thickness.texture) if isinstance(material, UnderFilm) else "",
-        )
+        material = self.boundary.material
+        varying = str(material.varying and material.varying.texture)
+        other_kernels = material.reflects_all, material.sums, material.tint is None, varying
         own = self.vcavity, self.coat is None, self.energy.kernel_constants()
         return *super().kernel_constants(), *own, *other_kernels
 

@@ -52,7 +52,8 @@ XML and the same in Python:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import copy
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -62,7 +63,6 @@ import mitsuba as mi
 
 from ..optics import through
 from ..optics.boundary import Geometry, Jones, geometry, power
-from ..optics.coat import Powers as TransmittedPowers
 from ..optics.through import (
     flat_transmittances,
     order_0,
@@ -81,7 +81,6 @@ from .directions import (
     PairThrough,
     PairWithin,
     Site,
-    TablePoint,
     drawing_cosine,
     media,
 )
@@ -91,6 +90,7 @@ from .properties import flag
 from .sampling import direction_of, drawn, with_even_share
 from .surface import DiffractingSurface, interfering
 from .types import (
+    Colour,
     Context,
     Float,
     Interaction,
@@ -160,17 +160,19 @@ class DiffractionDielectric(DiffractingSurface):
         if reflects:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
-                side, orders = reflected(ctx, site, wo, lit)
+                side, orders = reflected(ctx, site, wo, lit, kinds)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
         if transmits:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = PairThrough(si, wo, frame, lit, self.material.eta, self.thin)
-            passed = self._transmitted(ctx, site, crossing) * dr.abs(cos_o)
-            value = dr.select(lit, passed, value)
-            orders = self.power.density(crossing, site.scale, si) * dr.square(crossing.out)
-            density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        if self.energy.scales:
+            power, orders = self.power.answers(crossing, site.scale, site.scale, si, kinds)
+            if "v" in kinds:
+                passed = self._transmitted(ctx, site, crossing, power) * dr.abs(cos_o)
+                value = dr.select(lit, passed, value)
+            orders = with_even_share(orders * dr.square(crossing.out))
+            density = dr.select(lit, (1.0 - share) * orders, density)
+        if "v" in kinds and self.energy.scales:
             # s(ωi) s(ωo), such that reflected and transmitted light add up to 1
             value *= mi.Spectrum(self.energy.factor(site, wo))
         return value, density
@@ -204,68 +206,73 @@ class DiffractionDielectric(DiffractingSurface):
 
     # ------------------------------------------------------------------ reflection
 
-    def _above(self, ctx: Context, site: Site, wo: Vector3f, lit: Mask) -> tuple[Spectrum, Float]:
+    def _above(
+        self, ctx: Context, site: Site, wo: Vector3f, lit: Mask, kinds: str
+    ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
-        si = site.si
-        pair = Pair(si, wo, site.frame, lit)
-        power = self.power.power(pair, site.scale, si)
+        pair = Pair(site.si, wo, site.frame, lit)
+        power, density = self.power.answers(pair, site.scale, site.scale, site.si, kinds)
+        if "v" not in kinds:
+            return mi.Spectrum(0.0), density
         value = self.lobe(ctx, site, pair, self.boundary, power, lit)
         if self.thin:
             value += self._returned(site, pair)
-        return value, self.power.density(pair, site.scale, si)
+        return value, density
 
-    def _below(self, ctx: Context, site: Site, wo: Vector3f, lit: Mask) -> tuple[Spectrum, Float]:
+    def _below(
+        self, ctx: Context, site: Site, wo: Vector3f, lit: Mask, kinds: str
+    ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
-        n, si = self.material.eta, site.si
-        if self.thin:
-            outer = PairBelow(si, wo, site.frame, lit)
-            pair = CoatedPair(outer, n)
-            power = self.power.power(pair, site.scale, si)
-            value = self.lobe(ctx, site, pair, self.inner_boundary, power, lit)
-            value += self.face(ctx, site, outer, self.material, lit)
-            return value, self.power.density(outer, site.scale * n, si)
+        n, si, boundary = self.material.eta, site.si, self.inner_boundary
+        outer = PairBelow(si, wo, site.frame, lit)
         inner = PairWithin(si, wo, site.frame, lit, n)
-        power = self.power.power(inner.place, site.scale, si)
-        # a new mask, for the caller's stays as it is: tables do not reach farther
-        lit = lit & inner.reached
-        value = self.lobe(ctx, site, inner, self.inner_boundary, power, lit) * dr.square(n)
-        return value, self.power.density(inner, site.scale * n, si) * dr.square(n)
+        pair: Pair = CoatedPair(outer, n) if self.thin else inner
+        power, density = self.power.answers(pair, site.scale, site.scale * n, si, kinds)
+        value = mi.Spectrum(0.0)
+        if "v" in kinds and self.thin:
+            value = self.lobe(ctx, site, pair, boundary, power, lit)
+            value += self.face(ctx, site, outer, self.material, lit)
+        elif "v" in kinds:
+            # a new mask, for the caller's stays as it is: tables do not reach farther
+            lit = lit & inner.reached
+            value = self.lobe(ctx, site, inner, boundary, power, lit) * dr.square(n)
+        return value, density if self.thin else density * dr.square(n)
 
     def _returned(self, site: Site, pair: Pair) -> Spectrum:
         """f cosθo of light that the flat side of a sheet sends back through the structure."""
         n, ends = self.material.eta, (pair.cos_i, pair.cos_o)
         deep = [dr.sqrt(dr.fma(cosine, cosine, n * n - 1.0)) - cosine for cosine in ends]
-        point = TablePoint(pair.uv, dr.sqrt(dr.fma(deep[0], deep[0], dr.square(deep[1]))))
-        power = self.power.power(point, site.scale, site.si)
+        point = copy.copy(pair)
+        point.w = dr.sqrt(dr.fma(deep[0], deep[0], dr.square(deep[1])))
+        power, _ = self.power.answers(point, site.scale, site.scale, site.si, "v")
         both = dr.safe_sqrt(returned(ends[0], n) * returned(ends[1], n))
-        flat = self._of_mirror(site, pair, lambda cosine: returned(cosine, n))
+        visible, cosines = self._mirror(site, pair)
+        flat = visible * mi.UnpolarizedSpectrum([returned(cosine, n) for cosine in cosines])
         level = self.area_factor * pair.frame.area * pair.cos_o
         others = mi.depolarizer(power.others * (level * both))
-        zeroth = mi.depolarizer(power.zeroth * (level * mi.UnpolarizedSpectrum(flat)))
+        zeroth = mi.depolarizer(power.zeroth * (level * flat))
         return interfering(others, zeroth, power.cosine)
 
-    def _of_mirror(
-        self, site: Site, pair: Pair | PairThrough, power: Callable[[Float], Float]
-    ) -> list[Float]:
-        """Return C(X_i) C(X_o) times a power at cosθm, for each channel."""
+    def _mirror(self, site: Site, pair: Pair | PairThrough) -> tuple[Colour, list[Float]]:
+        """Return C(X_i) C(X_o), and cosθm for each channel."""
         width = self.table.sigma_0 * pair.frame.stretch
-        return [
-            pair.visible(width, k) * power(pair.mirror_cosine(k * width)) for k in site.wavenumbers
-        ]
+        visible = mi.UnpolarizedSpectrum([pair.visible(width, k) for k in site.wavenumbers])
+        return visible, [pair.mirror_cosine(k * width) for k in site.wavenumbers]
 
     # ------------------------------------------------------------------ transmission
 
-    def _transmitted(self, ctx: Context, site: Site, crossing: PairThrough) -> Spectrum:
+    def _transmitted(
+        self, ctx: Context, site: Site, crossing: PairThrough, power: Powers
+    ) -> Spectrum:
         """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
-        si, point = site.si, crossing.place
-        power = self.power.power(point, site.scale, si)
+        si = site.si
         if mi.is_rgb and power.cosine is None:  # a channel out of gamut stays finite where w → 0
             zeroth = dr.minimum(power.zeroth, power.others + power.zeroth)
             power = Powers(power.others + power.zeroth - zeroth, zeroth)
-        per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.above.z * -crossing.inside.z)
+        per_w = crossing.n * dr.rcp(dr.square(crossing.w) * crossing.above.z * -crossing.inside.z)
         pair = geometry(crossing.above, crossing.inside)
         others = self._factor(ctx, si, crossing, self._matrices(site, crossing, pair))
         flat = self._order_0(ctx, site, crossing, pair)
@@ -296,19 +303,14 @@ class DiffractionDielectric(DiffractingSurface):
 
     def _order_0(self, ctx: Context, site: Site, crossing: PairThrough, pair: Geometry) -> Spectrum:
         """Return N_0 C(X_i) C(X_o) of order 0, or its Mueller matrix, for each channel."""
-        n, thin, width = crossing.n, self.thin, self.table.sigma_0 * crossing.frame.stretch
-
-        def passed(cosine: Float) -> TransmittedPowers:
-            return flat_transmittances(cosine, n, thin)
-
-        if not mi.is_polarized:
-            powers = self._of_mirror(site, crossing, lambda cosine: 0.5 * sum(passed(cosine)))
-            return dr.select(crossing.leaves, mi.UnpolarizedSpectrum(powers), 0.0)
-        cosines = [crossing.mirror_cosine(k * width) for k in site.wavenumbers]
-        matrices = [order_0(pair, passed(cosine)) for cosine in cosines]
-        visible = mi.UnpolarizedSpectrum([crossing.visible(width, k) for k in site.wavenumbers])
-        flat = self._factor(ctx, site.si, crossing, matrices) * mi.Spectrum(visible)
-        return dr.select(crossing.leaves, flat, 0.0)
+        visible, cosines = self._mirror(site, crossing)
+        passed = [flat_transmittances(cosine, crossing.n, self.thin) for cosine in cosines]
+        if mi.is_polarized:
+            matrices = [order_0(pair, powers) for powers in passed]
+            flat = self._factor(ctx, site.si, crossing, matrices)
+        else:
+            flat = mi.UnpolarizedSpectrum([0.5 * sum(powers) for powers in passed])
+        return dr.select(crossing.leaves, flat * mi.Spectrum(visible), 0.0)
 
     def _factor(
         self, ctx: Context, si: Interaction, crossing: PairThrough, matrices: list[Jones]

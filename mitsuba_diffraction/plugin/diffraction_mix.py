@@ -68,7 +68,7 @@ class DiffractionMix(PluginBSDF):
         self.bsdfs = {name: bsdf for name, bsdf in objects if isinstance(bsdf, mi.BSDF)}
         self._held = list(self.bsdfs.values())  # where `dr.freeze` finds them
         self.weights = weights_of(props, self.bsdfs)
-        self.parameters = [each for weight in self.weights.varied for each in weight.changeable]
+        self.parameters = [*self.weights.varied]
         self.ready()
         for surface in self._held:
             if hasattr(surface, "mix"):
@@ -149,8 +149,6 @@ class DiffractionMix(PluginBSDF):
 
     def refusals(self) -> Iterator[str | None]:
         """See `PluginBSDF.refusals`."""
-        for weight in self.weights.varied:
-            yield weight.refusal()
         yield self.weights.refusal()
 
     def describe(self) -> Mix:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeAlias
 
 import drjit as dr
 import mitsuba as mi
@@ -17,6 +18,8 @@ from ..optics.mirror import (
 )
 from .types import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
 
+#: (u, v) and w of a look-up in tables.
+Place: TypeAlias = tuple[Vector2f, Float]
 SHADOWINGS = ("none", "vcavity")
 #: Least |w|: where n cosθt and cosθi are alike the power of an order other than 0 over w² has a
 #: limit, which single precision loses in the difference of all orders and order 0.
@@ -79,19 +82,12 @@ class Site:
     frame : the patch as it lies there.
     scale : factor on the heights.
     wavenumbers : 2π/λ of each channel, rad/µm.
-    given : the interaction as it is given, for a nested BSDF; None if it is `si`.
     """
 
     si: Interaction
     frame: PatchFrame
     scale: Float = 1.0
     wavenumbers: list[Float] = field(default_factory=list)
-    given: Interaction | None = None
-
-    @property
-    def nested_si(self) -> Interaction:
-        """The interaction for a nested BSDF."""
-        return self.si if self.given is None else self.given
 
 
 class Pair:
@@ -126,6 +122,11 @@ class Pair:
         """The pair outside of a coat."""
         return self
 
+    @property
+    def place(self) -> Place:
+        """Coordinates at which power and roughness are looked up."""
+        return self.uv, self.w
+
     @cached_property
     def incident(self) -> Vector2f:
         """Tangential part of ωi, in the patch's frame."""
@@ -144,17 +145,6 @@ class Pair:
     def mirror_cosine(self, sharpness: Float) -> Float:
         """Return cosθm of order 0 by kσ₀ (`optics.mirror`)."""
         return mirror_cosine(self.cos_half, self.cos_i, self.cos_o, sharpness)
-
-
-@dataclass(frozen=True)
-class TablePoint:
-    """The part of a `Pair` that tables of power and roughness are looked up at."""
-
-    uv: Vector2f
-    w: Float
-    cos_i: Float = 1.0
-    cos_o: Float = 1.0
-    asked: Mask = True
 
 
 class CoatedPair(Pair):
@@ -206,9 +196,9 @@ class PairWithin(PairBelow):
         self.n, self.uv, self.w = n, n * self.uv, n * self.w
 
     @property
-    def place(self) -> TablePoint:
-        """Return the coordinates to look up; 0 where not `reached`."""
-        return TablePoint(dr.select(self.reached, self.uv, 0.0), self.w)
+    def place(self) -> Place:
+        """See `Pair.place`; 0 where not `reached`."""
+        return dr.select(self.reached, self.uv, 0.0), self.w
 
     @property
     def reached(self) -> Mask:
@@ -242,7 +232,7 @@ class PairThrough:
     ----------
     above, below : directions where they are measured; inside : the one in the dielectric.
     place : of the look-up.
-    uv, w, cos_i, cos_o, frame, asked : what `PowerModel.density` asks of a pair.
+    uv, w, cos_i, cos_o, frame, asked : what densities are asked at.
     out : index of the medium of ωo, over that of the medium above.
     leaves : whether the direction below is within the critical angle.
     """
@@ -269,17 +259,21 @@ class PairThrough:
         w = -n * self.inside.z - self.above.z
         reached = dr.squared_norm(total) < dr.square(_FARTHEST * frame.stretch)
         self.active = active & reached
-        self.place = TablePoint(
-            dr.select(self.active, dr.select(w > 0.0, -total, total), 0.0),
-            dr.maximum(dr.abs(w), _LEAST_W),
-        )
+        self.w = dr.maximum(dr.abs(w), _LEAST_W)
+        at = dr.select(self.active, dr.select(w > 0.0, -total, total), 0.0)
+        self.place: Place = at, self.w
         into, self.out = media(n, thin, down)
         self.cos_i = drawing_cosine(dr.abs(si.wi.z), n, thin, down)
         self.cos_o = dr.select(active, dr.abs(wo.z), 1.0)
-        self.uv, self.w = -frame.to_table(into * si.wi + self.out * wo), self.place.w
+        self.uv = -frame.to_table(into * si.wi + self.out * wo)
         turned = self.below * mi.Vector3f(1.0, 1.0, -1.0)
         self._beyond = turned if thin else outside(turned, n)
         self.leaves = self._beyond.z > 0.0
+
+    @property
+    def outer(self) -> PairThrough:
+        """See `Pair.outer`."""
+        return self
 
     def visible(self, sigma_0: Float, k: Float) -> Float:
         """See `Pair.visible`: of both directions above the surface."""

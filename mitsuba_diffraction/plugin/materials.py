@@ -8,7 +8,6 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -24,8 +23,9 @@ from .arithmetic import plain
 from .conductors import spectrum_texture, tabulated_index
 from .description import Feature
 from .memory import upload
-from .parameter_changes import Bounded, Changeable, ObjectValues
+from .parameter_changes import Changeable
 from .types import Colour, Float, Interaction, Mask, Number, Spectrum, Texture
+from .varying import Varying
 
 #: Bounds of ratios of refractive indices: beyond, squares leave single precision's range.
 INDICES = (1e-3, 1e3)
@@ -53,6 +53,9 @@ class Material:
     absorbs : whether light that is not reflected is absorbed, and none goes beneath.
     tint : columns of `optics.colour.metal_tint` in RGB variants, of a tabulated metal.
     layer : FILM or STACK, of layers over a material; else None.
+    varying : `layers.Thickness` of a film by a texture, else None.
+    reflects_all : whether there is total reflection: the medium above is the denser one.
+    sums : `layers.Channels` of a film in RGB variants, else None.
     material : the material beneath layers, else None.
     """
 
@@ -62,6 +65,9 @@ class Material:
     absorbs = False
     tint: list[Colour] | None = None
     layer: Feature | None = None
+    varying: Any = None
+    reflects_all = False
+    sums: Any = None
     material: Material | None = None
 
     def indices(self, si: Interaction, active: Mask) -> list[Any]:
@@ -138,11 +144,11 @@ class Dielectric(Material):
     ----------
     int_ior, ext_ior : indices, or names that Mitsuba knows.
     name, least : name and smallest value of the ratio as a parameter.
+    advice : end of the message on a smaller one.
 
     Attributes
     ----------
     eta : the ratio.
-    reflects_all : whether there is total reflection: the medium above is the denser one.
     """
 
     def __init__(
@@ -151,10 +157,11 @@ class Dielectric(Material):
         ext_ior: float | str,
         name: str = "eta",
         least: float = INDICES[0],
+        advice: str = "",
     ) -> None:
-        eta = _ratio(int_ior, ext_ior)
-        self._index = Bounded(name, eta, least, INDICES[1], partial(_ratio_refusal, name, least))
-        self.eta, self.changeable = self._index.value, (self._index,)
+        eta, meaning = _ratio(int_ior, ext_ior), ", the ratio of refractive indices,"
+        index = Varying(name, eta, least, INDICES[1], meaning=meaning, advice=advice)
+        self.eta, self.changeable = index.value, (index,)
         self.derive()
 
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
@@ -166,20 +173,8 @@ class Dielectric(Material):
         self.reflects_all = plain(self.eta) < 1.0
         self.kind = Feature.RARER if self.reflects_all else Feature.DIELECTRIC
 
-    def refusal(self) -> str | None:
-        """See `Material.refusal`."""
-        return self._index.refusal()
-
     def __str__(self) -> str:
         return f"dielectric[eta = {plain(self.eta):.5g}]"
-
-
-def _ratio_refusal(name: str, least: float, ratio: float) -> str:
-    lowest = "above 0" if least == INDICES[0] else f"at least {least:g}"
-    return (
-        f"{name}={ratio:g}, the ratio of refractive indices, must be {lowest} and at most "
-        f"{INDICES[1]:g}"
-    )
 
 
 class Inside(Material):
@@ -199,9 +194,9 @@ class Conductor(Material):
 
     kind = Feature.CONDUCTOR
 
-    def __init__(self, eta: ObjectValues, k: ObjectValues, name: str) -> None:
-        self.eta: Texture = eta.thing
-        self.k: Texture = k.thing
+    def __init__(self, eta: Changeable, k: Changeable, name: str) -> None:
+        self.eta: Texture = eta.value
+        self.k: Texture = k.value
         self.name, self.changeable = name, (eta, k)
         self.absorbs = True
         self.medium: Dielectric | None = None  #: medium above, if not air
@@ -230,7 +225,7 @@ class Conductor(Material):
             )
         parts = zip(INDEX_PARTS.items(), (index.real, index.imag), strict=True)
         eta, k = (
-            ObjectValues(name, spectrum_texture(nodes, part, wavelength), bounds)
+            Changeable(name, spectrum_texture(nodes, part, wavelength), bounds)
             for (name, bounds), part in parts
         )
         conductor = cls(eta, k, material)

@@ -100,9 +100,9 @@ def read_packets(source: Buffer, index: Index, floats: int, active: Mask = True)
     ]
 
 
-def read_record(source: Buffer, index: Index, floats: int, active: Mask = True) -> list[Float]:
+def read_record(source: Buffer, index: Index, floats: int) -> list[Float]:
     """Gather the floats of the record with this index; see `read_packets`."""
-    return [x for packet in read_packets(source, index, floats, active) for x in packet]
+    return [x for packet in read_packets(source, index, floats) for x in packet]
 
 
 def packet_size(floats: int) -> int:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -19,73 +19,65 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from .memory import tensor
-from .types import Callback, Float
+from .types import Callback
 
 _OURS = __name__.rpartition(".")[0]
 #: Names by which Mitsuba's spectra and textures expose their values.
 _VALUES = ("value", "values", "data")
 
 
-class Changeable(Protocol):
-    """A parameter that `mi.traverse` exposes."""
+class Changeable:
+    """Parameter that `mi.traverse` exposes: a number, an array, or one of Mitsuba's objects.
 
-    def refusal(self) -> str | None:
-        """Reason why the value that was set is not allowed, or None."""
-
-    def restore(self) -> None:
-        """Set the value that was last kept."""
-
-    def keep(self) -> None:
-        """Remember the present value as the one to restore."""
-
-    def traverse(self, callback: Callback) -> None:
-        """Expose the parameter."""
-
-
-class Bounded:
-    """A differentiable number between bounds.
+    Of an object, a spectrum, a texture or a nested BSDF, all values are checked, kept and restored.
 
     Parameters
     ----------
     name : for `mi.traverse`.
-    value : the first value.
-    low, high : the smallest and the largest value allowed.
-    message : the text of a refusal, from the value refused.
-
-    value : mi.Float, always the same object: Mitsuba assigns to it.
+    value : always the same object: Mitsuba assigns to it, or to its values.
+    bounds : smallest and largest value allowed in spectra and textures; None allows any finite
+        number.
     """
 
-    def __init__(
-        self, name: str, value: float, low: float, high: float, message: Callable[[float], str]
-    ) -> None:
-        self.value: Float = mi.Float(value)
-        # bounds to the precision of values: 1.1 is above 1.1 in single precision
-        self._low, self.high = (float(np.float32(bound)) for bound in (low, high))
-        self._name, self._message = name, message
+    def __init__(self, name: str, value: Any, bounds: tuple[float, float] | None = None) -> None:
+        self.name, self.value, self._bounds = name, value, bounds
         self.keep()
 
     def refusal(self) -> str | None:
-        """See `Changeable.refusal`."""
-        numbers = np.array(dr.detach(self.value), float).ravel()
-        wrong = numbers[~((numbers >= self._low) & (numbers <= self.high))]
-        return self._message(float(wrong[0])) if len(wrong) else None
+        """Reason why the value that was set is not allowed, or None."""
+        for key, value in mi.traverse(self.value):
+            numbers = _numbers(value)
+            bounds = self._bounds if key.rpartition(".")[2] in _VALUES else None
+            low, high = bounds or (-np.inf, np.inf)
+            allowed = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
+            if not allowed.all():
+                range_ = f"between {low:g} and {high:g}" if bounds else "finite"
+                name = self.name if key in _VALUES else f"{self.name}.{key}"
+                return f"{name}={numbers[~allowed][0]:g} must be {range_}"
+        return None
 
     def restore(self) -> None:
-        """See `Changeable.restore`."""
-        if dr.is_jit_v(self.value):
-            mi.set_property(self.value, self._kept)
+        """Set the value that was last kept."""
+        if isinstance(self.value, mi.Object):
+            kept = {key: _copy(value) for key, value in self._kept.items()}
+            mi.traverse(self.value).update(kept)
+        elif dr.is_array_v(self.value):
+            mi.set_property(self.value, _copy(self._kept))
 
     def keep(self) -> None:
-        """See `Changeable.keep`; also makes the value a variable of the kernels, not a literal."""
-        dr.make_opaque(self.value)
-        self._kept: Float = mi.Float(dr.detach(self.value))
+        """Remember the present value; a number becomes a variable of the kernels, no literal."""
+        if isinstance(self.value, mi.Object):
+            self._kept: Any = {key: _copy(value) for key, value in mi.traverse(self.value)}
+        else:
+            dr.make_opaque(self.value)
+            self._kept = _copy(self.value)
 
     def traverse(self, callback: Callback) -> None:
-        """See `Changeable.traverse`."""
-        callback.put(self._name, self.value, mi.ParamFlags.Differentiable)
+        """Expose the parameter."""
+        callback.put(self.name, self.value, mi.ParamFlags.Differentiable)
 
 
-class GivenHeights:
+class GivenHeights(Changeable):
     """Heights given as `data`: another table is made where they change.
 
     Parameters
@@ -96,26 +88,25 @@ class GivenHeights:
 
     Attributes
     ----------
-    values : `mi.TensorXf`, always the same object: Mitsuba assigns to it.
     missing : what the surface lacks to have derivatives by heights; empty where it has them.
     """
 
     def __init__(
         self, name: str, heights: NDArray[np.float64], make: Callable[[NDArray[np.float64]], Any]
     ) -> None:
-        self.values, self._loaded = tensor(heights), heights
-        self._name, self._make = name, make
+        super().__init__(name, tensor(heights))
+        self._loaded, self._make = heights, make
         self.missing: list[str] = []
-        self._first = self._kept = self._served = self._numbers()
+        self._first = self._served = self._numbers()
         self._served_derivatives = False
 
     @property
     def differentiable(self) -> bool:
         """Whether derivatives by the heights are wanted."""
-        return bool(dr.grad_enabled(self.values))
+        return bool(dr.grad_enabled(self.value))
 
     def _numbers(self) -> NDArray[Any]:
-        return np.array(dr.detach(self.values))
+        return np.array(dr.detach(self.value))
 
     def made(self) -> Any:
         """Return the patch of heights that changed, or have derivatives; None of others."""
@@ -131,67 +122,17 @@ class GivenHeights:
     def refusal(self) -> str | None:
         """See `Changeable.refusal`."""
         if self.differentiable and self.missing:
-            return f"{self._name} has derivatives only with {', '.join(self.missing)}"
-        if self.values.shape == self._kept.shape:
+            return f"{self.name} has derivatives only with {', '.join(self.missing)}"
+        if self.value.shape == self._kept.shape:
             return None
-        shape, kept = (" × ".join(map(str, each)) for each in (self.values.shape, self._kept.shape))
-        return f"{self._name} of {shape} heights must be of {kept}, as loaded; load the plugin anew"
-
-    def restore(self) -> None:
-        """See `Changeable.restore`."""
-        mi.set_property(self.values, tensor(self._kept))
-
-    def keep(self) -> None:
-        """See `Changeable.keep`."""
-        self._kept = self._numbers()
+        shape, kept = (" × ".join(map(str, each)) for each in (self.value.shape, self._kept.shape))
+        return f"{self.name} of {shape} heights must be of {kept}, as loaded; load the plugin anew"
 
     def traverse(self, callback: Callback) -> None:
         """See `Changeable.traverse`."""
         flags = mi.ParamFlags
         flag = flags.NonDifferentiable if self.missing else flags.Differentiable
-        callback.put(self._name, self.values, flag)
-
-
-class ObjectValues:
-    """All values of one of Mitsuba's objects: a spectrum, a texture or a nested BSDF.
-
-    Parameters
-    ----------
-    name : name of the parameter that holds the object.
-    thing : the object.
-    bounds : smallest and largest value allowed in spectra and textures; None allows any finite
-        number.
-    """
-
-    def __init__(self, name: str, thing: Any, bounds: tuple[float, float] | None = None) -> None:
-        self.thing = thing
-        self._name, self._bounds = name, bounds
-        self.keep()
-
-    def refusal(self) -> str | None:
-        """See `Changeable.refusal`."""
-        for key, value in mi.traverse(self.thing):
-            numbers = _numbers(value)
-            bounds = self._bounds if key.rpartition(".")[2] in _VALUES else None
-            low, high = bounds or (-np.inf, np.inf)
-            allowed = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
-            if not allowed.all():
-                range_ = f"between {low:g} and {high:g}" if bounds else "finite"
-                name = self._name if key in _VALUES else f"{self._name}.{key}"
-                return f"{name}={numbers[~allowed][0]:g} must be {range_}"
-        return None
-
-    def restore(self) -> None:
-        """See `Changeable.restore`."""
-        mi.traverse(self.thing).update({key: _copy(value) for key, value in self._kept.items()})
-
-    def keep(self) -> None:
-        """See `Changeable.keep`."""
-        self._kept = {key: _copy(value) for key, value in mi.traverse(self.thing)}
-
-    def traverse(self, callback: Callback) -> None:
-        """See `Changeable.traverse`."""
-        callback.put(self._name, self.thing, mi.ParamFlags.Differentiable)
+        callback.put(self.name, self.value, flag)
 
 
 def take_changes(changed: Any, together: Sequence[Any]) -> None:

@@ -11,49 +11,38 @@ from pathlib import Path
 import mitsuba as mi
 
 from ..errors import DiffractionError, warn
-from ..files import readable_file
 from ..heights import LoadOptions
-from ..heights.lengths import numbers_of
 from ..llvm import require_loaded_llvm
 from ..optics.boundary import MODELS
 from ..optics.materials import PERFECT, TISSUES, index_at_sodium, material_named
 from ..retired import retired
-from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE
+from ..settings import SCENE_SETTINGS, SURFACE
 from ..tables import DiffractionTable
 from .arithmetic import plain
 from .description import Feature
 from .dictionary import ORDERS, PLUGINS
-from .layers import Thickness, UnderFilm
+from .layers import FILM_ENDS, UnderFilm, thickness_of
 from .materials import INDEX_PARTS, Conductor, Dielectric, Material, Perfect
-from .parameter_changes import ObjectValues
-from .pigment import PICTURES, pigment_bsdf
-from .properties import choice, class_of, number
+from .parameter_changes import Changeable
+from .pigment import pigment_bsdf
+from .properties import choice, class_of, coherence_of, number
 from .stack import UnderStack, read_layers
 from .types import BSDF, Properties
 from .varying import Orientation
-from .window_positions import TILINGS, WindowPositions
+from .window_positions import PLACING
 
 SOURCES = ("filename", "data")
 #: Earlier names of parameters, which are accepted with one line.
 EARLIER = {"heightfield": "filename", "table": "filename"}
 READING = tuple(field.name for field in fields(LoadOptions))
-#: Parameters of coherence='surface'.
-PLACING = ("uv_scale", "world_scale", "tiling")
 #: Layers, pigment and medium that "none" leaves out, so that a scene can have a parameter for them.
 OPTIONAL = ("coat_ior", "film_ior", "layers", "ext_ior", "pigment")
-#: Thicknesses, nm, where a texture of film_thickness is 0 and 1.
-FILM_ENDS = ("film_thickness_min", "film_thickness_max")
-#: µm a unit; beyond, single precision holds positions on the surface to no better than 1 µm.
-MOST_UV_SCALE = 1e7
 #: nm, of mono variants.
 DEFAULT_WAVELENGTH = 550.0
 #: Default indices: air, and the keratin of shed snake skin.
 AIR, KERATIN = 1.000277, 1.5
 #: Smallest relative index that light goes through: orders that go through depend on n − 1.
 LEAST_INDEX = 1.01
-#: Path 2 n d in a film on a metal (nm) times RMS height (µm) from which on colours deviate by 10 %
-#: in light from 60°: by docs/make/validation/filmed.py 7 % of 37, 19 % of 59 and 32 % of 74.
-ROUGH = 45.0
 
 REFLECTING, TRANSMITTING = PLUGINS
 _COMMON = (
@@ -205,34 +194,28 @@ def surface_material(props: Properties, coat: Dielectric | None) -> Material:
         raise DiffractionError(f"{conductor[0]} alone is not a conductor; give both eta and k")
     if not conductor:
         return _dielectric(props, read_index(props, "int_ior", KERATIN), coat)
+    wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
     if "material" not in conductor:
         metal = Conductor(_index_part(props, "eta"), _index_part(props, "k"), "eta, k")
-        return _in_medium(metal, props, coat)
-    value = props.get("material")
-    if not isinstance(value, str | int | float):
+    elif not isinstance(value := props.get("material"), str | int | float):
         raise DiffractionError(f"material={class_of(value)} must be a name or an index")
-    material = material_named(value)
-    if material == PERFECT:
+    elif (material := material_named(value)) == PERFECT:
         return Perfect()
-    if isinstance(material, complex) and not material.imag:
+    elif isinstance(material, str):
+        metal = Conductor.of_material(material, wavelength)
+    elif not material.imag:
         return _dielectric(props, material.real, coat)
-    wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
-    if isinstance(material, str):
-        return _in_medium(Conductor.of_material(material, wavelength), props, coat)
-    parts = zip(INDEX_PARTS, (material.real, material.imag), strict=True)
-    eta, k = (
-        ObjectValues(n, mi.load_dict({"type": "uniform", "value": x}), INDEX_PARTS[n])
-        for n, x in parts
-    )
-    metal = Conductor(eta, k, f"n = {material.real:g} + {material.imag:g}i")
-    return _in_medium(metal, props, coat)
-
-
-def _in_medium(metal: Conductor, props: Properties, coat: Dielectric | None) -> Conductor:
-    """Put a material with an index of its own into the medium above it, with its dispersion."""
+    else:
+        parts = zip(INDEX_PARTS, (material.real, material.imag), strict=True)
+        eta, k = (
+            Changeable(n, mi.load_dict({"type": "uniform", "value": x}), INDEX_PARTS[n])
+            for n, x in parts
+        )
+        metal = Conductor(eta, k, f"n = {material.real:g} + {material.imag:g}i")
+    # into the medium above it, with its dispersion
     above = material_named(str(props.get("coat_ior", props.get("ext_ior", ""))) or PERFECT)
     if above in TISSUES:
-        metal.disperse(str(above), number(props, "wavelength", DEFAULT_WAVELENGTH))
+        metal.disperse(str(above), wavelength)
     metal.medium = coat
     if "ext_ior" in props:
         if coat is not None:
@@ -252,27 +235,20 @@ def _dielectric(props: Properties, index: float | str, coat: Dielectric | None) 
 
 def transmissive_of(props: Properties) -> Dielectric:
     """Read a dielectric that light goes through."""
+    advice = (
+        f": int_ior must be at least {LEAST_INDEX:g} times ext_ior; turn the surface round if the "
+        "denser medium is above"
+    )
     indices = read_index(props, "int_ior", KERATIN), read_index(props, "ext_ior", AIR)
-    material = Dielectric(*indices, least=LEAST_INDEX)
-    if refused := material.refusal():
-        raise DiffractionError(
-            f"{refused}: int_ior must be at least {LEAST_INDEX:g} times ext_ior; turn the surface "
-            "round if the denser medium is above"
-        )
-    return material
+    return Dielectric(*indices, least=LEAST_INDEX, advice=advice)
 
 
 def coat_of(props: Properties) -> Dielectric | None:
     """Read the clear layer over the structure, or return None."""
     if "coat_ior" not in props:
         return None
-    coat = Dielectric(read_index(props, "coat_ior"), _above(props), "coat_eta", 1.0)
-    if plain(coat.eta) < 1.0:
-        raise DiffractionError(
-            f"coat_ior={props.get('coat_ior')} is below the index of the medium above the coat; "
-            "a coat's is at least as large"
-        )
-    return coat
+    advice = ": coat_ior must not be below the index of the medium above the coat"
+    return Dielectric(read_index(props, "coat_ior"), _above(props), "coat_eta", 1.0, advice)
 
 
 def layered(props: Properties, material: Material, table: DiffractionTable) -> Material:
@@ -296,55 +272,7 @@ def layered(props: Properties, material: Material, table: DiffractionTable) -> M
         raise DiffractionError("film_ior needs a material with a refractive index beneath it")
     film = Dielectric(read_index(props, "film_ior"), _above(props), "film_eta")
     k, thickness = number(props, "film_k", 0.0), thickness_of(props)
-    filmed = UnderFilm(material, film, k, thickness, wavelength, table.wavelength_range)
-    for refused in (*(parameter.refusal() for parameter in filmed.changeable), filmed.refusal()):
-        if refused:
-            raise DiffractionError(refused)
-    return filmed
-
-
-def thickness_of(props: Properties) -> Thickness:
-    """Return the thickness of a film: a number, or a texture of 0 to 1 between two of them.
-
-    The name of a picture stands for its texture.
-
-    Raises a DiffractionError if a texture lacks its thicknesses, or a number has them.
-    """
-    name, ends = "film_thickness", [each for each in FILM_ENDS if each in props]
-    value = dict(props.objects()).get(name)
-    text = str(props.get(name)) if value is None else ""
-    if Path(text).suffix.lower() in PICTURES:
-        file = readable_file(resolved_path(text, name))
-        value = mi.load_dict({"type": "bitmap", "filename": str(file), "raw": True})
-    if isinstance(value, mi.Texture):
-        if FILM_ENDS[1] not in ends:
-            raise DiffractionError(
-                f"{name} is a texture of 0 to 1 between {FILM_ENDS[0]} (0 by default) and "
-                f"{FILM_ENDS[1]}; give {FILM_ENDS[1]}, the thickness where it is 1, in nm"
-            )
-        first, last = (number(props, each, 0.0) for each in FILM_ENDS)
-        for each, end in zip(FILM_ENDS, (first, last), strict=True):
-            if end < 0.0:
-                raise DiffractionError(f"{each}={end:g} nm must be at least 0 nm")
-        return Thickness(value, (first, last))
-    if ends:
-        raise DiffractionError(f"{ends[0]} is for a {name} that is a texture")
-    advice = f", a texture, or a picture ({', '.join(PICTURES)}) of 0 to 1"
-    return Thickness(number(props, name, 0.0, advice), (0.0, 0.0))
-
-
-def warn_of_film(material: Material, table: DiffractionTable, scale: float) -> None:
-    """Warn of a film whose fringes are finer than the model can follow on these heights."""
-    if not isinstance(material, UnderFilm) or not isinstance(material.material, Conductor):
-        return
-    index, thickness = material.numbers()
-    rms = scale * math.sqrt(float(table.roughness.nodes.max()))
-    if 2.0 * index.real * thickness * rms > ROUGH:
-        warn(
-            f"film_thickness={thickness:g} nm on a metal of RMS height {1e3 * rms:.0f} nm: beside "
-            "rigorous solutions, expect the colours to be off by more than 10 % beyond 60° from "
-            "the normal (docs/validation.md)"
-        )
+    return UnderFilm(material, film, k, thickness, wavelength, table.wavelength_range)
 
 
 def _above(props: Properties) -> float | str:
@@ -353,12 +281,12 @@ def _above(props: Properties) -> float | str:
     return read_index(props, "ext_ior", 1.0 if relative else AIR)
 
 
-def _index_part(props: Properties, name: str) -> ObjectValues:
+def _index_part(props: Properties, name: str) -> Changeable:
     """Part of a complex index, a spectrum or texture whose values are checked where exposed."""
     # A colour becomes a spectrum whose values are coefficients of any sign
     coefficients = mi.is_spectral and props.type(name) == mi.Properties.Type.Color
     texture = props.get_unbounded_texture(name)
-    part = ObjectValues(name, texture, None if coefficients else INDEX_PARTS[name])
+    part = Changeable(name, texture, None if coefficients else INDEX_PARTS[name])
     if refused := part.refusal():
         raise DiffractionError(f"{refused}: the index is eta + ik")
     return part
@@ -382,57 +310,6 @@ def read_index(props: Properties, name: str, default: float = 1.0) -> float | st
 
 
 # ------------------------------------------------------------------ table and surface
-
-
-def coherence_of(props: Properties) -> str:
-    """Return the coherence that a scene asks for."""
-    return choice(props, "coherence", (*COHERENCES, SURFACE))
-
-
-def window_positions(props: Properties, table: DiffractionTable) -> WindowPositions | None:
-    """Positions of windows on the patch, from UV coordinates with a scale."""
-    tiling = choice(props, "tiling", TILINGS)
-    scales: dict[str, tuple[float, ...]] = {}
-    # Checked in any case: one scene may be rendered with every coherence
-    for name, most in ((PLACING[0], 2), (PLACING[1], 1)):
-        if name not in props:
-            continue
-        numbers = numbers_of(props.get(name)) or ()
-        if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
-            expected = "one number" if most == 1 else "one number or two, 'u, v',"
-            raise DiffractionError(
-                f"{name}={props.get(name)!r} must be {expected} of µm, above 0 and at most "
-                f"{MOST_UV_SCALE:g}"
-            )
-        scales[name] = tuple(numbers)
-    if coherence_of(props) != SURFACE:
-        return None
-    if len(scales) != 1:
-        raise DiffractionError(
-            f"coherence='{SURFACE}' takes one of uv_scale, µm a unit of UV coordinates, and "
-            f"world_scale, µm a unit of length of the scene; got {' and '.join(scales) or 'none'}"
-        )
-    ((name, numbers),) = scales.items()
-    return WindowPositions((numbers[0], numbers[-1]), name == "world_scale", tiling, table)
-
-
-def resolved_path(name: str, parameter: str) -> Path:
-    """Return the file of this name: as it is, or in a folder where Mitsuba looks for files.
-
-    Raises a DiffractionError if the file is missing, with the folders.
-    """
-    if not name:  # the first folder
-        raise DiffractionError(f"{parameter} is empty; name a file")
-    resolver = mi.file_resolver()
-    path = Path(str(resolver.resolve(name)))
-    if path.exists() or path.is_absolute():
-        return path  # whoever opens it says that it does not exist
-    folders = dict.fromkeys(str(Path(str(folder)).resolve()) for folder in resolver)
-    looked = ", ".join(repr(folder) for folder in folders)
-    raise DiffractionError(
-        f"{parameter}: '{name}' does not exist; looked for it in {looked}; give its whole path, "
-        "or put it there"
-    )
 
 
 def mono_wavelength(props: Properties, wavelength_range: tuple[float, float]) -> float:

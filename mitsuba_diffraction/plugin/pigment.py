@@ -8,7 +8,6 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import DiffractionError, one_line, quoted
 from ..extras import optional
@@ -62,16 +61,8 @@ def pigment_range(text: str | float | None) -> tuple[float, float]:
     if not _is_spectrum(str(text)):
         _reflectance(str(text))
         return 0.0, math.inf
-    lam, _ = read_reflectance(str(text))
+    lam, _ = read_shares(str(text), REQUIRED)
     return float(lam[0]), float(lam[-1])
-
-
-def read_reflectance(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read wavelengths (n,) in nm and reflectances (n,) from 0 to 1 from FILE[:COLUMN][:UNIT].
-
-    Raises a DiffractionError if the file has no such column, or its reflectances are out of range.
-    """
-    return read_shares(path, REQUIRED)
 
 
 def _is_spectrum(text: str) -> bool:
@@ -81,7 +72,7 @@ def _is_spectrum(text: str) -> bool:
 def _reflectance(text: str) -> dict[str, Any]:
     """Return a reflectance as Mitsuba's dictionary of a spectrum."""
     if _is_spectrum(text):
-        lam, value = read_reflectance(text)
+        lam, value = read_shares(text, REQUIRED)
         if lam[0] > REQUIRED[0] or lam[-1] < REQUIRED[1]:
             raise DiffractionError(
                 f"pigment='{text}' is known from {lam[0]:g} to {lam[-1]:g} nm, and light from "

@@ -14,7 +14,7 @@ import mitsuba as mi
 from ..optics.geometry import wavenumber
 from ..tables import DiffractionTable
 from .device_table import DeviceTable, device_table
-from .directions import Pair, PairThrough, TablePoint
+from .directions import Pair, PairThrough
 from .height_derivatives import DifferentiableHeights
 from .rgb import RGBPower, rgb_power
 from .sampling import order_sampler
@@ -46,7 +46,7 @@ class SpectralPower:
         heights: DifferentiableHeights | None = None,
     ) -> None:
         self.device = device_table(table) if heights is None else DeviceTable(table, heights)
-        self._places = places
+        self._places, self._parts = places, 3 if self.device.grid.coherent else 2
         self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma_0, self._ratio = table.sigma_0, table.order_0_ratio
         # to rounding
@@ -56,47 +56,59 @@ class SpectralPower:
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
-        """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
-        return _powers(self._each(*self._power(pair, height_scale, si), si, pair, height_scale))
-
-    def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
-        """Return the density of `draw` per solid angle, the mean over wavelengths."""
-        density = self._density(pair, height_scale)
-        return _mean(self._each(density, 1, si, pair, height_scale))
-
-    def both(
-        self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
+    def answers(
+        self,
+        pair: Pair | PairThrough,
+        height_scale: Float,
+        drawing_scale: Float,
+        si: Interaction,
+        kinds: str,
     ) -> tuple[Powers, Float]:
-        """Return `power` at `height_scale`, and `density` at `drawing_scale`, outside of a coat.
+        """Return power and density of a pair, those asked for; zero where not.
 
-        The density is computed first: the look-up of power evicts its small tables from the cache.
+        "v" asks for ⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel; "d" for the density of `draw` per
+        solid angle, outside of a coat, the mean over wavelengths.
+
+        drawing_scale : factor on heights that directions are drawn for.
         """
-        density = self._density(pair.outer, drawing_scale)
-        power, count = self._power(pair, height_scale, si)
-        both = self._each(lambda k: [*density(k), *power(k)], 1 + count, si, pair, height_scale)
-        return _powers([powers for _, *powers in both]), _mean(both)
+        # the density first: the look-up of power evicts its small tables from the cache
+        asked = [self._density(pair.outer, drawing_scale)] if "d" in kinds else []
+        asked += [self._power(pair, height_scale, si)] if "v" in kinds else []
+        numbers = ("d" in kinds) + ("v" in kinds) * self._parts
+        found = self._each(
+            lambda k: [x for each in asked for x in each(k)], numbers, si, pair, height_scale
+        )
+        nothing = mi.UnpolarizedSpectrum(0.0)
+        power, density = Powers(nothing, nothing), mi.Float(0.0)
+        if "v" in kinds:
+            parts = zip(*(values[-self._parts :] for values in found), strict=True)
+            power = Powers(*(mi.UnpolarizedSpectrum(list(part)) for part in parts))
+        if "d" in kinds:
+            first, *others = [values[0] for values in found]
+            density = sum(others, first) * (1.0 / len(found))
+        return power, density
 
     def _power(
-        self, pair: Pair | TablePoint, height_scale: Float, si: Interaction
-    ) -> tuple[PerWavenumber, int]:
-        """Return a function that computes the values of `Powers`, and the number of values."""
-        scaled_w = pair.w * height_scale
+        self, pair: Pair | PairThrough, height_scale: Float, si: Interaction
+    ) -> PerWavenumber:
+        """Return a function that computes the values of `Powers`."""
+        uv, w = pair.place
+        scaled_w = w * height_scale
         if self._places is None or not isinstance(pair, Pair):
             windows: Sequence[PlacedWindow] = ()
         else:
             windows = self._places.at(si, pair.frame)
 
         def of_wavelength(k: Float) -> list[Float]:
-            sums = self.device.window_sums(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
+            sums = self.device.window_sums(k * uv.x, k * uv.y, k * scaled_w, windows)
             unit, serves = dr.square(k * (0.5 / dr.pi)), self._serves(k)
             return [*(dr.select(serves, each * unit, 0.0) for each in sums[:2]), *sums[2:]]
 
-        return of_wavelength, 3 if windows or self.device.grid.coherent else 2
+        return of_wavelength
 
     def _density(self, pair: Pair | PairThrough, height_scale: Float) -> PerWavenumber:
         def of_wavelength(k: Float) -> list[Float]:
-            strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
+            strategy = self._sampler.strategies.at(k * dr.detach(height_scale), pair.cos_i)
             density = self._sampler.density(k * pair.uv, strategy)
             return [density * pair.cos_o * pair.frame.area * dr.square(k)]
 
@@ -123,7 +135,7 @@ class SpectralPower:
         """Return 2π/λ of each channel, rad/µm."""
         return [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
 
-    def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
         """Return `power` of a flat surface, (σ₀/σ)² exp(−σ₀²k²|(u, v)|²)/λ²."""
         apart = -(self._sigma_0**2) * dr.squared_norm(pair.uv)
         peak = self._ratio * (0.5 / dr.pi) ** 2
@@ -158,7 +170,7 @@ class SpectralPower:
         function: PerWavenumber,
         values: int,
         si: Interaction,
-        pair: Pair | TablePoint | PairThrough,
+        pair: Pair | PairThrough,
         scale: Float,
     ) -> list[list[Float]]:
         """Evaluate a function that returns so many values at each wavelength.
@@ -183,16 +195,6 @@ class SpectralPower:
         asked = mi.Mask(pair.asked)
         loop = dr.while_loop(state, lambda n, *_: (n < count) & asked, body)
         return list(loop[2])
-
-
-def _powers(values: list[list[Float]]) -> Powers:
-    return Powers(*(mi.UnpolarizedSpectrum(list(part)) for part in zip(*values, strict=True)))
-
-
-def _mean(values: list[list[Float]]) -> Float:
-    """Return the mean over wavelengths of the first value."""
-    densities = [density for density, *_ in values]
-    return sum(densities[1:], densities[0]) * (1.0 / len(densities))
 
 
 #: Diffracted power in a variant's channels, and a density to draw directions from.

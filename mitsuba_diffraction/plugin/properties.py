@@ -1,12 +1,14 @@
-"""Words, flags and numbers from Mitsuba's Properties, refused by name."""
+"""Words, flags, numbers and files from Mitsuba's Properties, refused by name."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import mitsuba as mi
 
 from ..errors import DiffractionError, check_choice
+from ..settings import COHERENCES, SURFACE
 from .types import BSDF, Properties
 
 
@@ -15,6 +17,11 @@ def choice(props: Properties, name: str, choices: tuple[str, ...]) -> str:
     value = props.get(name, choices[0])
     check_choice(name, value, choices)
     return str(value)
+
+
+def coherence_of(props: Properties) -> str:
+    """Return the coherence that a scene asks for."""
+    return choice(props, "coherence", (*COHERENCES, SURFACE))
 
 
 def flag(props: Properties, name: str, default: bool) -> bool:
@@ -43,3 +50,22 @@ def number(props: Properties, name: str, default: float, advice: str = "") -> fl
 def class_of(element: BSDF) -> str:
     """Return the class of an element of a scene, for example `SmoothDielectric`."""
     return str(element.class_name())
+
+
+def resolved_path(name: str, parameter: str) -> Path:
+    """Return the file of this name: as it is, or in a folder where Mitsuba looks for files.
+
+    Raises a DiffractionError if the file is missing, with the folders.
+    """
+    if not name:  # the first folder
+        raise DiffractionError(f"{parameter} is empty; name a file")
+    resolver = mi.file_resolver()
+    path = Path(str(resolver.resolve(name)))
+    if path.exists() or path.is_absolute():
+        return path  # whoever opens it says that it does not exist
+    folders = dict.fromkeys(str(Path(str(folder)).resolve()) for folder in resolver)
+    looked = ", ".join(repr(folder) for folder in folders)
+    raise DiffractionError(
+        f"{parameter}: '{name}' does not exist; looked for it in {looked}; give its whole path, "
+        "or put it there"
+    )

@@ -1,7 +1,7 @@
 """RGB variants: the diffracted power in daylight's colours, and directions drawn by brightness.
 
-`ColourLookup` is the twin of `ColourTable.colour`, which defines the interpolation: one packet load
-fetches all terms of all colours of a bin. For the density of ωo per solid angle see
+`RGBPower` is the twin of `ColourTable.colour`, which defines the interpolation: one packet
+load fetches all terms of all colours of a bin. For the density of ωo per solid angle see
 `tables.colour.proposals`; (u, v) → ωo has the Jacobian dωo = du dv / cosθo.
 """
 
@@ -16,81 +16,14 @@ import numpy as np
 from ..optics.colour import RGB_WAVELENGTHS
 from ..optics.geometry import wavenumber
 from ..tables import DiffractionTable
-from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
-from ..tables.colour.table import PACKET, TERMS, ColourTable, cached_colours
-from .arithmetic import index_of, maximum, minimum
-from .directions import Pair, PairThrough, TablePoint
-from .memory import index_between, once_a_table, read, read_record, upload
-from .sampling import BELOW_ONE, invert, order_0_share
-from .series import series_weights
+from ..tables.colour.proposals import LOBES, colour_proposals
+from ..tables.colour.table import PACKET, TERMS, cached_colours
+from .arithmetic import maximum, minimum
+from .directions import Pair, PairThrough
+from .memory import once_a_table, read, read_record, upload
+from .sampling import BELOW_ONE, Strategies, invert
+from .series import inner, series_weights
 from .types import Buffer, Colour, Float, Index, Interaction, Powers, Vector2f
-
-
-class ColourLookup:
-    """A colour table in the memory of the current variant."""
-
-    def __init__(self, table: ColourTable) -> None:
-        self.expansion, self.grid = table.expansion, table.grid
-        starts = [self.grid.start(n) for n in range(self.grid.rings)]
-        self._starts = upload(mi.UInt32, np.array([*starts, self.grid.bins], np.uint32))
-        self._inverse_scale = 1.0 / table.scale
-        self._radius_end = table.radius_end
-        self._radii, self._zs = table.order_0.shape[:2]
-        # not `HalfFloats`: dark colours are sums of subnormal numbers
-        self._coefficients = upload(mi.Float16, table.coefficients)
-        self._order_0 = upload(mi.Float, table.order_0)
-
-    def ring(self, squared_radius: Float) -> Float:
-        """Position among the rings; below 0 inside the smallest."""
-        smallest = self.grid.smallest**2
-        logarithm = dr.log(maximum(squared_radius, 0.25 * smallest) * (1.0 / smallest))
-        return logarithm * (0.5 / self.grid.step)
-
-    def turn(self, uv: Vector2f) -> Float:
-        """Azimuth in turns, 0 … 1."""
-        turn = dr.atan2(uv.y, uv.x) * (0.5 / dr.pi)
-        return dr.select(turn < 0.0, turn + 1.0, turn)
-
-    def start(self, ring: Index) -> Index:
-        """Index of a ring's first bin."""
-        return read(mi.UInt32, self._starts, ring)
-
-    def others(self, uv: Vector2f, z: Float) -> Colour:
-        """Return the RGB of all orders but 0 in 1/µm², signed; z must not be beyond the table's."""
-        interval, weights = series_weights(self.expansion, TERMS, z)
-        ring, t = _split(self.ring(dr.squared_norm(uv)), self.grid.rings)
-        turn = self.turn(uv)
-        starts = [self.start(ring + n) for n in range(3)]
-        total = [mi.Float(0.0)] * (3 * TERMS)
-        for n, of_ring in ((0, 1.0 - t), (1, t)):
-            count = starts[n + 1] - starts[n]  # one more than there are azimuths
-            azimuth, a = _split(turn * (mi.Float(count) - 1.0), count)
-            bin_ = interval * self.grid.bins + starts[n] + azimuth
-            for m, share in ((0, of_ring * (1.0 - a)), (1, of_ring * a)):
-                packet = read_record(self._coefficients, bin_ + m, PACKET)
-                total = [dr.fma(p, share, s) for p, s in zip(packet, total, strict=False)]
-        colours = []
-        for c in range(3):
-            value = total[c * TERMS] * weights[0]
-            for term in range(1, TERMS):
-                value = dr.fma(total[c * TERMS + term], weights[term], value)
-            colours.append(value * self._inverse_scale)
-        return mi.Color3f(*colours)
-
-    def zeroth(self, uv: Vector2f, z: Float) -> Colour:
-        """Return the RGB of order 0, 0 beyond its lobe."""
-        radius = dr.sqrt(maximum(dr.squared_norm(uv), 1e-14))
-        inside = radius < self._radius_end
-        at_radius = radius * ((self._radii - 1) / self._radius_end)
-        row, s = _split(dr.select(inside, at_radius, 0.0), self._radii)
-        column, t = _split(z * ((self._zs - 1) / self.expansion.kappa_max), self._zs)
-        result = [mi.Float(0.0)] * 3
-        for n, of_radius in ((0, 1.0 - s), (1, s)):
-            for m, of_z in ((0, 1.0 - t), (1, t)):
-                packet = read_record(self._order_0, (row + n) * self._zs + column + m, 4)
-                share = dr.select(inside, of_radius * of_z, 0.0)
-                result = [dr.fma(p, share, r) for p, r in zip(packet, result, strict=False)]
-        return mi.Color3f(*result)
 
 
 def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
@@ -109,22 +42,46 @@ class RGBPower:
 
     def __init__(self, summed: DiffractionTable) -> None:
         self._coherent, table = summed.grid.coherent, cached_colours(summed)
-        self._lookup = ColourLookup(table)
-        self._grid, self._z_max = table.grid, table.z_max
+        self._expansion, self._grid, self._z_max = table.expansion, table.grid, table.z_max
+        starts = [self._grid.start(n) for n in range(self._grid.rings)]
+        self._starts = upload(mi.UInt32, np.array([*starts, self._grid.bins], np.uint32))
+        # not `HalfFloats`: dark colours are sums of subnormal numbers
+        self._coefficients = upload(mi.Float16, table.coefficients)
+        self._inverse_scale = 1.0 / table.scale
+        self._radius_end = table.radius_end
+        self._radii, self._columns = table.order_0.shape[:2]
+        self._order_0 = upload(mi.Float, table.order_0)
         proposals = colour_proposals(table)
         self._ring_sums = upload(mi.Float, proposals.rings)
         self._azimuth_sums = upload(mi.Float, proposals.azimuths)
-        self._occupied = upload(mi.Float, proposals.occupied.astype("float32"))
-        self._zs = len(proposals.order_0)
-        self._order_0 = upload(mi.Float, proposals.order_0)
+        occupied = proposals.occupied.astype(np.float32)
+        self._strategies = Strategies(occupied, proposals.order_0, table.z_max)
         self._wavenumbers = [mi.Float(k) for k in wavenumber(RGB_WAVELENGTHS).tolist()]
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma_0 / lam) ** 2 for lam in LOBES]
 
-    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Powers:
-        """See `SpectralPower.power`."""
-        z = pair.w * height_scale
-        others, zeroth = self._lookup.others(pair.uv, z), self._lookup.zeroth(pair.uv, z)
+    def answers(
+        self,
+        pair: Pair | PairThrough,
+        height_scale: Float,
+        drawing_scale: Float,
+        si: Interaction,
+        kinds: str,
+    ) -> tuple[Powers, Float]:
+        """See `SpectralPower.answers`."""
+        power, density = Powers(mi.Color3f(0.0), mi.Color3f(0.0)), mi.Float(0.0)
+        if "d" in kinds:
+            outer = pair.outer
+            share, band, _ = self._strategies.at(dr.detach(drawing_scale), outer.cos_i)
+            density = self._density(outer.uv, share, band) * outer.cos_o * outer.frame.area
+        if "v" in kinds:
+            power = self._power(*pair.place, height_scale)
+        return power, density
+
+    def _power(self, uv: Vector2f, w: Float, height_scale: Float) -> Powers:
+        """Return the `Powers` of a place."""
+        z = w * height_scale
+        others, zeroth = self._others(uv, z), self._zeroth(uv, z)
         if not self._coherent:
             return Powers(others, zeroth)
         # the table has |o + c|² − |c|², with c of order 0: o is taken in phase with c, or opposite
@@ -136,18 +93,6 @@ class RGBPower:
         others = dr.select(both, dr.square(apart), total - outside)
         return Powers(others, dr.select(both, zeroth, outside), cosine)
 
-    def density(self, pair: Pair | PairThrough, height_scale: Float, si: Interaction) -> Float:
-        """See `SpectralPower.density`."""
-        strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
-        return self._density(pair.uv, *strategy) * pair.cos_o * pair.frame.area
-
-    def both(
-        self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
-    ) -> tuple[Powers, Float]:
-        """See `SpectralPower.both`."""
-        density = self.density(pair.outer, drawing_scale, si)
-        return self.power(pair, height_scale, si), density
-
     def bounded(self, si: Interaction) -> Interaction:
         """See `SpectralPower.bounded`; colours have no bounds."""
         return si
@@ -156,9 +101,56 @@ class RGBPower:
         """See `SpectralPower.wavenumbers`; of the wavelength that is a channel's mean."""
         return self._wavenumbers
 
-    def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
         """See `SpectralPower.flat`: of order 0 where no phase tells heights apart."""
-        return self._lookup.zeroth(pair.uv, mi.Float(0.0))
+        return self._zeroth(pair.uv, mi.Float(0.0))
+
+    def _ring_at(self, squared_radius: Float) -> Float:
+        """Position among the rings; below 0 inside the smallest."""
+        smallest = self._grid.smallest**2
+        logarithm = dr.log(maximum(squared_radius, 0.25 * smallest) * (1.0 / smallest))
+        return logarithm * (0.5 / self._grid.step)
+
+    def _turn(self, uv: Vector2f) -> Float:
+        """Azimuth in turns, 0 … 1."""
+        turn = dr.atan2(uv.y, uv.x) * (0.5 / dr.pi)
+        return dr.select(turn < 0.0, turn + 1.0, turn)
+
+    def _start(self, ring: Index) -> Index:
+        """Index of a ring's first bin."""
+        return read(mi.UInt32, self._starts, ring)
+
+    def _others(self, uv: Vector2f, z: Float) -> Colour:
+        """Return the RGB of all orders but 0 in 1/µm², signed; z must not be beyond the table's."""
+        interval, weights = series_weights(self._expansion, TERMS, z)
+        ring, t = _split(self._ring_at(dr.squared_norm(uv)), self._grid.rings)
+        turn = self._turn(uv)
+        starts = [self._start(ring + n) for n in range(3)]
+        total = [mi.Float(0.0)] * (3 * TERMS)
+        for n, of_ring in ((0, 1.0 - t), (1, t)):
+            count = starts[n + 1] - starts[n]  # one more than there are azimuths
+            azimuth, a = _split(turn * (mi.Float(count) - 1.0), count)
+            bin_ = interval * self._grid.bins + starts[n] + azimuth
+            for m, share in ((0, of_ring * (1.0 - a)), (1, of_ring * a)):
+                packet = read_record(self._coefficients, bin_ + m, PACKET)
+                total = [dr.fma(p, share, s) for p, s in zip(packet, total, strict=False)]
+        colours = (inner(total[c * TERMS : (c + 1) * TERMS], weights) for c in range(3))
+        return mi.Color3f(*(colour * self._inverse_scale for colour in colours))
+
+    def _zeroth(self, uv: Vector2f, z: Float) -> Colour:
+        """Return the RGB of order 0, 0 beyond its lobe."""
+        radius = dr.sqrt(maximum(dr.squared_norm(uv), 1e-14))
+        inside = radius < self._radius_end
+        at_radius = radius * ((self._radii - 1) / self._radius_end)
+        row, s = _split(dr.select(inside, at_radius, 0.0), self._radii)
+        column, t = _split(z * ((self._columns - 1) / self._z_max), self._columns)
+        result = [mi.Float(0.0)] * 3
+        for n, of_radius in ((0, 1.0 - s), (1, s)):
+            for m, of_z in ((0, 1.0 - t), (1, t)):
+                packet = read_record(self._order_0, (row + n) * self._columns + column + m, 4)
+                share = dr.select(inside, of_radius * of_z, 0.0)
+                result = [dr.fma(p, share, r) for p, r in zip(packet, result, strict=False)]
+        return mi.Color3f(*result)
 
     def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
         """Density of `draw` per du dv."""
@@ -167,12 +159,12 @@ class RGBPower:
         for sharpness in self._sharpness:
             lobe = dr.exp(-sharpness * squared_radius) * (sharpness / dr.pi)
             glossy += lobe * (1.0 / len(self._sharpness))
-        position = self._lookup.ring(squared_radius)
+        position = self._ring_at(squared_radius)
         inside = (position >= 0.0) & (position < self._grid.rings - 1.0)
         position = dr.select(inside, position, 0.0)
         ring = dr.minimum(mi.UInt32(position), self._grid.rings - 2)
         start, count = self._ring(ring)
-        azimuth = dr.minimum(mi.UInt32(self._lookup.turn(uv) * mi.Float(count)), count - 1)
+        azimuth = dr.minimum(mi.UInt32(self._turn(uv) * mi.Float(count)), count - 1)
         cell = self._difference(self._ring_sums, band * self._grid.rings + ring)
         cell *= self._difference(self._azimuth_sums, band * self._grid.bins + start + azimuth)
         # A cell is step·2π/count wide in ln r and φ, and r² d(ln r) dφ = du dv
@@ -184,7 +176,7 @@ class RGBPower:
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
         """See `SpectralPower.draw`."""
-        share, band = self._strategy(cos_i, height_scale)
+        share, band, _ = self._strategies.at(height_scale, cos_i)
         lobe = dr.clip(sample1 / share * len(self._sharpness), 0, len(self._sharpness) - 1)
         lobe = mi.UInt32(lobe)
         sample2 = minimum(sample2, BELOW_ONE)
@@ -203,20 +195,10 @@ class RGBPower:
             sample1 < share, mi.Vector2f(glossy), mi.Vector2f(radius * cos, radius * sin)
         )
 
-    def _strategy(self, cos_i: Float, height_scale: Float) -> tuple[Float, Index]:
-        """Share of the samples that order 0 gets, and the band of the other orders."""
-        bands = BANDS / (BANDED * self._z_max)
-        band = index_of(index_between(height_scale * (cos_i + 0.5) * bands, 0.0, BANDS - 1.0))
-        position = 2.0 * height_scale * cos_i * ((self._zs - 1) / self._z_max)
-        z = index_between(position, 0.0, self._zs - 1.0)
-        brightness = read(mi.Float, self._order_0, index_of(z + 0.5))
-        share = order_0_share(brightness, cos_i)
-        return dr.select(read(mi.Float, self._occupied, band) > 0.0, share, 1.0), band
-
     def _ring(self, ring: Index) -> tuple[Index, Index]:
         """First bin of a ring, and its azimuths."""
-        start = self._lookup.start(ring)
-        return start, self._lookup.start(ring + 1) - start - 1
+        start = self._start(ring)
+        return start, self._start(ring + 1) - start - 1
 
     def _difference(self, sums: Buffer, index: Index) -> Float:
         return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from ..tables import DiffractionTable
 from ..tables.sampling import BANDED, SHIFT, proposals
@@ -54,6 +55,35 @@ class Strategy(NamedTuple):
     unit: Float
 
 
+class Strategies:
+    """Strategies of a table's densities, by κ and direction of incidence.
+
+    Parameters
+    ----------
+    units : (bands,) factors of `Strategy`; 0 where there is no power besides order 0.
+    order_0 : (n,) power of order 0 over κ, even from 0 to `kappa_max`.
+    kappa_max : largest κ, in the unit of the κ that are looked up.
+    """
+
+    def __init__(
+        self, units: NDArray[np.float32], order_0: NDArray[np.float32], kappa_max: float
+    ) -> None:
+        self._units, self._order_0 = upload(mi.Float, units), upload(mi.Float, order_0)
+        self._last_band, self._last = len(units) - 1.0, len(order_0) - 1.0
+        self._bands_per_kappa = len(units) / (BANDED * kappa_max)
+        self._steps_per_kappa = self._last / kappa_max
+
+    def at(self, kappa: Float, cos_i: Float) -> Strategy:
+        """Choose how to draw for light at this cosine; kappa : k or 1, times the height scale."""
+        position = kappa * (cos_i + 0.5) * self._bands_per_kappa
+        band = index_of(index_between(position, 0.0, self._last_band))
+        nearest = dr.fma(2.0 * kappa * cos_i, self._steps_per_kappa, 0.5)
+        power = read(mi.Float, self._order_0, index_of(index_between(nearest, 0.0, self._last)))
+        share = order_0_share(power, cos_i)
+        unit = read(mi.Float, self._units, band)
+        return Strategy(dr.select(unit > 0.0, share, 1.0), band, unit)
+
+
 class OrderSampler:
     """Sampler of spatial frequencies for one wavelength, and its density."""
 
@@ -73,23 +103,8 @@ class OrderSampler:
             table.sigma / (math.sqrt(math.pi) * within) if lobe else 1.0 / cell
             for lobe, within, cell in zip(self._lobes, self._within, densities.cell, strict=True)
         ]
-        self._units = upload(mi.Float, densities.units * np.float32(largest[0] * largest[1]))
-        self._order_0 = upload(mi.Float, densities.order_0)
-        self._last_band = len(densities.units) - 1.0
-        self._bands_per_kappa = len(densities.units) / (BANDED * table.expansion.kappa_max)
-        self._last = len(densities.order_0) - 1.0
-        self._steps_per_kappa = self._last / table.expansion.kappa_max
-
-    def strategy(self, k: Float, cos_i: Float, height_scale: Float) -> Strategy:
-        """Choose how to draw for wavenumber k and incident light at this cosine."""
-        kappa = k * height_scale
-        position = kappa * (cos_i + 0.5) * self._bands_per_kappa
-        band = index_of(index_between(position, 0.0, self._last_band))
-        nearest = dr.fma(2.0 * kappa * cos_i, self._steps_per_kappa, 0.5)
-        power = read(mi.Float, self._order_0, index_of(index_between(nearest, 0.0, self._last)))
-        share = order_0_share(power, cos_i)
-        unit = read(mi.Float, self._units, band)
-        return Strategy(dr.select(unit > 0.0, share, 1.0), band, unit)
+        units = densities.units * np.float32(largest[0] * largest[1])
+        self.strategies = Strategies(units, densities.order_0, table.expansion.kappa_max)
 
     def density(self, q: Vector2f, strategy: Strategy) -> Float:
         """Density of drawing the frequency q, per (rad/µm)²."""
@@ -116,7 +131,7 @@ class OrderSampler:
         self, k: Float, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f
     ) -> Vector2f:
         """A frequency (mi.Vector2f, rad/µm) for wavenumber k from three uniform numbers."""
-        share, band, _ = self.strategy(k, cos_i, height_scale)
+        share, band, _ = self.strategies.at(k * height_scale, cos_i)
         sample2 = minimum(sample2, BELOW_ONE)
         glossy = mi.warp.square_to_std_normal(sample2) * (1.0 / (self._sigma_0 * dr.sqrt(2.0)))
         start = band * (self._rows + 1)

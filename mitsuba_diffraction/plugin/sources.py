@@ -23,7 +23,8 @@ from ..tables import DiffractionTable, TableSource, providing
 from ..tables.source import loaded_table
 from .dictionary import Data
 from .parameter_changes import GivenHeights
-from .parameters import READING, SOURCES, coherence_of, resolved_path
+from .parameters import READING, SOURCES
+from .properties import coherence_of, resolved_path
 from .types import Properties
 
 #: Mitsuba samples its spectral variants' wavelengths from here on, nm.

@@ -10,18 +10,19 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from ..optics.boundary import model_of
 from ..tables.build.derivatives import missing
 from . import parameters as read
 from .arithmetic import plain
 from .base import SurfaceBSDF
-from .boundary import KIRCHHOFF, Boundary, boundary_of, order_0
-from .conductors import tabulated_range
+from .boundary import Boundary, order_0
+from .conductors import is_tabulated
 from .description import Feature, Surface
 from .directions import CoatedPair, Pair, PatchFrame, Site
 from .energy import EnergyModel
 from .energy_factors import ScaleRange
 from .height_derivatives import MOST_DIFFERENTIABLE, DifferentiableHeights
-from .layers import UnderFilm
+from .layers import warn_of_film
 from .loops import only_in
 from .materials import Material, tinted
 from .power import PowerModel, power_model
@@ -40,6 +41,7 @@ from .types import (
     Spectrum,
 )
 from .varying import LEAST_SCALE, MOST_SCALE, LateralScale, Varying, largest_of
+from .window_positions import window_positions
 
 
 class DiffractingSurface(SurfaceBSDF):
@@ -91,11 +93,12 @@ class DiffractingSurface(SurfaceBSDF):
         self.orientation = read.orientation_of(props)
         self.wavelength = read.mono_wavelength(props, self.table.wavelength_range)
         self.energy_conserving = flag(props, "energy_conserving", True)
-        self.window_positions = read.window_positions(props, self.table)
+        self.window_positions = window_positions(props, self.table)
         self.power = self._power()
         material = read.layered(props, material, self.table)
-        read.warn_of_film(material, self.table, largest)
-        self.boundary, self.fresnel = boundary_of(model, material, self.table.roughness), material
+        warn_of_film(material, self.table, largest)
+        self.boundary = Boundary(model_of(model), material).on(self.table.roughness)
+        self.fresnel = material
         # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
         self.area_factor = 4.0 * dr.pi * self.table.sigma**2
 
@@ -104,8 +107,8 @@ class DiffractingSurface(SurfaceBSDF):
         if self.given is not None:
             self.given.missing = self._missing()
             self.parameters.append(self.given)
-        owners = self.height_scale, self.orientation, self.lateral_scale, self.fresnel
-        self.parameters += [each for owner in owners for each in owner.changeable]
+        lateral = [self.lateral_scale] if self.lateral_scale.given else []
+        self.parameters += [self.height_scale, self.orientation, *lateral, *self.fresnel.changeable]
         super().ready()
 
     # ------------------------------------------------------------------ the model
@@ -191,7 +194,7 @@ class DiffractingSurface(SurfaceBSDF):
         """See `SurfaceBSDF.site_at`."""
         scale = self.height_scale.at(si, active)
         known = self.power.bounded(si)
-        return Site(known, self.frame_at(si, active), scale, self.power.wavenumbers(known), si)
+        return Site(known, self.frame_at(si, active), scale, self.power.wavenumbers(known))
 
     def frame_at(self, si: Interaction, active: Mask) -> PatchFrame:
         """Return the patch as it lies at points of the surface."""
@@ -203,8 +206,6 @@ class DiffractingSurface(SurfaceBSDF):
 
     def refusals(self) -> Iterator[str | None]:
         """See `PluginBSDF.refusals`."""
-        yield self.height_scale.refusal()
-        yield self.lateral_scale.refusal()
         yield self.fresnel.refusal()
 
     def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:
@@ -233,18 +234,18 @@ class DiffractingSurface(SurfaceBSDF):
     def _power(self) -> PowerModel:
         heights = None
         if self.given is not None and self.given.differentiable:
-            heights = DifferentiableHeights(self.given.values, self.heights().heights)
+            heights = DifferentiableHeights(self.given.value, self.heights().heights)
         return power_model(self.table, self.wavelength, self.window_positions, heights)
 
     def _missing(self) -> list[str]:
         """Return what the surface lacks to have derivatives by its heights."""
         assert self.given is not None
-        heights, given = self.heights().heights, np.array(self.given.values)
+        heights, given = self.heights().heights, np.array(self.given.value)
         rounding = 1e-5 * np.ptp(given) + np.spacing(np.abs(given).max())  # of single precision
         treated = heights.shape != given.shape or np.ptp(heights - given) > rounding
         lacks = {
             "a spectral or mono variant": mi.is_rgb,
-            "model=kirchhoff": self.boundary.model.name != KIRCHHOFF.name,
+            "model=kirchhoff": self.boundary.model.name != "kirchhoff",
             "energy_conserving=false": self.energy_conserving,
             "no BSDF beneath": self.nested is not None,
             "heights that no crop, level or clip changes": treated,
@@ -287,9 +288,9 @@ class DiffractingSurface(SurfaceBSDF):
             lateral_scale=self.lateral_scale.quantity,
             kind=material.kind,
             index=None if material.kind is Feature.MIRROR else material.at,
-            material=material.name if tabulated_range(material.name) else "",
+            material=material.name if is_tabulated(material.name) else "",
             layer=structure.layer,
-            film_varies=isinstance(structure, UnderFilm) and bool(structure.thickness.texture),
+            film_varies=structure.varying is not None,
             model=str(self.boundary),
             transmits=self.transmits,
         )

@@ -15,7 +15,7 @@ from ..errors import DiffractionError
 from .arithmetic import plain
 from .description import Quantity
 from .memory import index_between
-from .parameter_changes import Bounded, Changeable, ObjectValues
+from .parameter_changes import Changeable
 from .properties import number
 from .textures import is_bitmap, range_of, require_raw
 from .types import Float, Interaction, Mask, Properties, Rotation, Texture
@@ -24,7 +24,7 @@ from .types import Float, Interaction, Mask, Properties, Rotation, Texture
 LEAST_SCALE = 1e-30
 
 
-class Varying:
+class Varying(Changeable):
     """Parameter that is a number, or a texture's or mesh attribute's number at each point.
 
     Parameters
@@ -33,12 +33,12 @@ class Varying:
     value : number or raw texture of one channel.
     low, high : bounds; a texture's numbers are clamped to them.
     positive : whether the number must be above 0, where `low` is; a texture's 0 is a tiny number.
-    unit : of the number, for messages; advice : end of the message on a number out of bounds.
+    unit, meaning : of the number, for messages; advice : end of the message on a number out of
+        bounds.
 
     Attributes
     ----------
     texture : the texture, or None.
-    changeable : parameters that `traverse` exposes.
 
     Raises a DiffractionError if a number, or a texture's known range, is out of bounds.
     """
@@ -52,40 +52,30 @@ class Varying:
         *,
         positive: bool = False,
         unit: str = "",
+        meaning: str = "",
         advice: str = "",
     ) -> None:
-        self.name, self.low, self.high, self._unit = name, low, high, unit
+        self.low, self.high = low, high
+        self._unit, self._meaning, self._advice = unit, meaning, advice
         self._least = LEAST_SCALE if positive and low == 0.0 else low
         self.texture = value if isinstance(value, mi.Texture) else None
-        self.changeable: tuple[Changeable, ...]
-        if self.texture is None:
-            least = "above 0" if self._least > low else f"at least {low:g}{unit}"
-            bounds = f"{least} and at most {high:g}{unit}{advice}"
-
-            def message(value: float) -> str:  # a method would be a cycle of references
-                return f"{name}={value:g}{unit} must be {bounds}"
-
-            # to single precision, as bounds are
-            bounded = Bounded(name, float(np.float32(value)), self._least, high, message)
-            self._number, self.changeable = bounded.value, (bounded,)
-            refused = bounded.refusal()
-        else:
+        if self.texture is not None:
             require_raw(self.texture, name, "numbers")
-            self.changeable = (ObjectValues(name, self.texture),)
-            refused = self.refusal()
-        if refused:
+        # to single precision, as bounds are
+        super().__init__(name, self.texture or mi.Float(float(np.float32(value))))
+        if refused := self.refusal():
             raise DiffractionError(refused)
 
     def at(self, si: Interaction, active: Mask) -> Float:
         """Return the number at points of the surface."""
         if self.texture is None:
-            return self._number
+            return self.value
         return index_between(self.texture.eval_1(si, active), self._least, self.high)
 
     @property
     def number(self) -> float:
         """The number, or the upper bound of a texture's numbers."""
-        return self.high if self.texture is not None else plain(dr.max(self._number))
+        return self.high if self.texture is not None else plain(dr.max(self.value))
 
     def range(self) -> tuple[float, float]:
         """Return the smallest and the largest number, as far as known."""
@@ -97,7 +87,7 @@ class Varying:
     @property
     def differentiable(self) -> bool:
         """Whether derivatives with respect to the number are wanted."""
-        return self.texture is None and dr.grad_enabled(self._number)
+        return self.texture is None and dr.grad_enabled(self.value)
 
     @property
     def quantity(self) -> Quantity:
@@ -105,11 +95,26 @@ class Varying:
         return Quantity(self.number, self.texture)
 
     def refusal(self) -> str | None:
-        """Reason why a texture's numbers are not allowed, or None."""
-        if self.texture is None or (known := range_of(self.texture)) is None:
+        """See `Changeable.refusal`."""
+        if self.texture is not None:
+            return self._range_refusal(self.texture) or super().refusal()
+        numbers = np.array(dr.detach(self.value), float).ravel()
+        low, high = np.float32(self._least), np.float32(self.high)
+        wrong = numbers[~((numbers >= low) & (numbers <= high))]
+        if not len(wrong):
+            return None
+        least = "above 0" if self._least > self.low else f"at least {self.low:g}{self._unit}"
+        return (
+            f"{self.name}={wrong[0]:g}{self._unit}{self._meaning} must be {least} and at most "
+            f"{self.high:g}{self._unit}{self._advice}"
+        )
+
+    def _range_refusal(self, texture: Texture) -> str | None:
+        """Reason why the range of a texture's numbers is not allowed, or None."""
+        if (known := range_of(texture)) is None:
             return None
         # to single precision; procedural textures are clipped, as the documentation says
-        high = known[1] if is_bitmap(self.texture) else min(known[1], self.high)
+        high = known[1] if is_bitmap(texture) else min(known[1], self.high)
         if self.low <= known[0] and high <= self.high * (1.0 + 1e-6):
             return None
         return (
@@ -166,6 +171,7 @@ class LateralScale(Varying):
     ----------
     of_table : factor by which the table's heights are stretched: the largest, or 1 where none is
         above 1, so that no look-up goes beyond the table's frequencies.
+    given : whether a scene gives the factor, which may change then.
     """
 
     def __init__(self, props: Properties) -> None:
@@ -184,15 +190,14 @@ class LateralScale(Varying):
         high = largest if isinstance(value, mi.Texture) else self.of_table
         advice = ", the table's range; load the plugin anew with that lateral_scale_max"
         super().__init__(name, value, LEAST_STRETCH, high, advice=advice)
-        if name not in props:
-            self.changeable = ()
+        self.given = name in props
 
     def over_table(self, si: Interaction, active: Mask) -> Float:
         """Return the factor relative to the table's.
 
         The plain number 1 without lateral_scale: kernels have no operation for it.
         """
-        return self.at(si, active) * (1.0 / self.of_table) if self.changeable else 1.0
+        return self.at(si, active) * (1.0 / self.of_table) if self.given else 1.0
 
     def range_over_table(self) -> tuple[float, float]:
         """Return the least and the largest factor relative to the table's, as far as known."""
@@ -230,8 +235,9 @@ class Orientation(Varying):
     """
 
     def __init__(self, value: float | Texture) -> None:
-        self._doubled = False
         super().__init__("orientation", value, -MOST_DEGREES, MOST_DEGREES, unit="°")
+        bitmap = self.texture is not None and is_bitmap(self.texture)
+        self._doubled = bitmap and _doubled(self.texture)
 
     def rotation(self, si: Interaction, active: Mask) -> Rotation:
         """Return (cos, sin) of the angle at points of the surface."""
@@ -251,27 +257,8 @@ class Orientation(Varying):
         """The angle in degrees, or the texture, for descriptions."""
         return Quantity(self.number if self.texture is None else 0.0, self.texture)
 
-    def refusal(self) -> str | None:
-        """Reason why a texture's values are not directions, or None."""
-        if self.texture is None or not is_bitmap(self.texture):
-            return None  # attributes of meshes are checked where there is a mesh
-        if (channels := mi.traverse(self.texture)["data"].shape[-1]) < 3:
-            return (
-                f"orientation: the bitmap has {channels} channel; an orientation has "
-                "three: cosine, sine and an unused one"
-            )
-        data = np.array(mi.traverse(self.texture)["data"], np.float32)[..., :2]
-        levels = 65535.0 * data  # float32: half would overflow
-        integers = levels.min() >= 0.0 and levels.max() <= 65535.5
-        integers = integers and np.all(np.abs(levels - np.rint(levels)) < 0.02)
-        self._doubled = bool(integers and _unit_share(data) <= _MOST)
-        if self._doubled and _unit_share(2.0 * data - 1.0) <= _MOST:
-            return (
-                "orientation: the bitmap comes from a picture of 8 or 16 bits, which holds no "
-                "negative numbers: save (1 + cos)/2 and (1 + sin)/2 there, or (cos, sin) in a "
-                "float format, as EXR"
-            )
-        return None
+    def _range_refusal(self, texture: Texture) -> None:
+        """See `Varying._range_refusal`: directions are checked once, or where there is a mesh."""
 
     def __str__(self) -> str:
         if not self._doubled:
@@ -280,6 +267,27 @@ class Orientation(Varying):
             f"{super().__str__()} of (1 + cos)/2, (1 + sin)/2, within {PRECISION[8]:.2g}° in 8 "
             f"bits and {PRECISION[16]:.2g}° in 16"
         )
+
+
+def _doubled(bitmap: Texture) -> bool:
+    """Whether a bitmap holds (1 + cos)/2 and (1 + sin)/2; refuse one without directions."""
+    data = np.array(mi.traverse(bitmap)["data"], np.float32)
+    if (channels := data.shape[-1]) < 3:
+        raise DiffractionError(
+            f"orientation: the bitmap has {channels} channel; an orientation has "
+            "three: cosine, sine and an unused one"
+        )
+    levels = 65535.0 * (data := data[..., :2])  # float32: half would overflow
+    integers = levels.min() >= 0.0 and levels.max() <= 65535.5
+    integers = integers and np.all(np.abs(levels - np.rint(levels)) < 0.02)
+    doubled = bool(integers and _unit_share(data) <= _MOST)
+    if doubled and _unit_share(2.0 * data - 1.0) <= _MOST:
+        raise DiffractionError(
+            "orientation: the bitmap comes from a picture of 8 or 16 bits, which holds no "
+            "negative numbers: save (1 + cos)/2 and (1 + sin)/2 there, or (cos, sin) in a "
+            "float format, as EXR"
+        )
+    return doubled
 
 
 def _unit_share(directions: np.ndarray[Any, Any]) -> float:

@@ -21,18 +21,26 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
+from ..errors import DiffractionError
+from ..heights.lengths import numbers_of
+from ..settings import SURFACE
 from ..tables import DiffractionTable
 from .arithmetic import index_of
 from .directions import PatchFrame
 from .memory import index_between
-from .types import Float, Interaction, Rotation, Vector2f
+from .properties import choice, coherence_of
+from .types import Float, Interaction, Properties, Rotation, Vector2f
 
+#: Parameters of coherence='surface'.
+PLACING = ("uv_scale", "world_scale", "tiling")
 TILINGS = ("periodic", "random")
+#: µm a unit; beyond, single precision holds positions on the surface to no better than 1 µm.
+MOST_UV_SCALE = 1e7
 #: Corners are numbered from minus this on: single precision has twice as many whole numbers.
 _MOST_CORNERS = 2.0**22
 
 
-@dataclass(frozen=True)
+@dataclass  # not frozen: Dr.Jit assigns to it in loops
 class PlacedWindow:
     """A window at a point of the surface, by the phases that it gives to orders.
 
@@ -106,6 +114,33 @@ class WindowPositions:
 
     def __str__(self) -> str:
         return self._name
+
+
+def window_positions(props: Properties, table: DiffractionTable) -> WindowPositions | None:
+    """Positions of windows on the patch, from UV coordinates with a scale."""
+    tiling = choice(props, "tiling", TILINGS)
+    scales: dict[str, tuple[float, ...]] = {}
+    # Checked in any case: one scene may be rendered with every coherence
+    for name, most in ((PLACING[0], 2), (PLACING[1], 1)):
+        if name not in props:
+            continue
+        numbers = numbers_of(props.get(name)) or ()
+        if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
+            expected = "one number" if most == 1 else "one number or two, 'u, v',"
+            raise DiffractionError(
+                f"{name}={props.get(name)!r} must be {expected} of µm, above 0 and at most "
+                f"{MOST_UV_SCALE:g}"
+            )
+        scales[name] = tuple(numbers)
+    if coherence_of(props) != SURFACE:
+        return None
+    if len(scales) != 1:
+        raise DiffractionError(
+            f"coherence='{SURFACE}' takes one of uv_scale, µm a unit of UV coordinates, and "
+            f"world_scale, µm a unit of length of the scene; got {' and '.join(scales) or 'none'}"
+        )
+    ((name, numbers),) = scales.items()
+    return WindowPositions((numbers[0], numbers[-1]), name == "world_scale", tiling, table)
 
 
 def _triangle(position: Vector2f) -> tuple[list[Vector2f], list[Float]]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from .expansion import series_sum
-from .powers import order_0_power
+from .powers import order_0_power, parts_at
 from .table import DiffractionTable
 from .window import tap_matrix
 
@@ -130,7 +130,7 @@ def order_mixture(
     powers = np.empty((count, 0), np.float32)
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
     stored = []
-    powers_at = _Powers(table, axes, apart=apart)
+    powers_at = partial(_powers_at, table, axes, apart=apart)
 
     def smoothed(power: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.asarray((splats[0] @ (splats[1] @ power).T).T)
@@ -197,51 +197,35 @@ class _Axis:
         self.weight = 1.0
 
 
-class _Powers:
-    """Powers at any κ; keeps the coefficients of the last interval in single precision.
+def _powers_at(
+    table: DiffractionTable, axes: list[_Axis], kappa: float, *, apart: bool
+) -> tuple[NDArray[np.float32], float, NDArray[np.float32]]:
+    """Powers (ny, nx) of all orders but 0, the power of order 0, and their interference.
 
     apart : whether the interference of a window's order 0 is not among the others' powers.
     """
-
-    def __init__(self, table: DiffractionTable, axes: list[_Axis], *, apart: bool) -> None:
-        self._table, self._axes, self._apart = table, axes, apart
-        self._interval = -1
-        self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
-
-    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, NDArray[np.float32]]:
-        """Powers (ny, nx) of all orders but 0, the power of order 0, and their interference."""
-        table, axes = self._table, self._axes
-        expansion = table.expansion
-        interval = int(expansion.interval(kappa))
-        _, ny, nx, components, terms = table.coefficients.shape
-        if interval != self._interval:
-            flat = table.coefficients[interval].reshape(-1, terms)
-            self._interval, self._coefficients = interval, flat.astype(np.float32)
-        scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
-        parts = series_sum(self._coefficients, scaled).reshape(ny, nx, components)
-        centre = float(order_0_power(table, kappa))
-        if table.grid.overlapping:
-            amplitude = parts[..., 0] + 1j * parts[..., 1]
-            amplitude[table.grid.last[1], table.grid.last[0]] = complex(*table.order_0_at(kappa))
-            field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
-            weight = axes[0].weight * axes[1].weight
-            mean = complex(*table.order_0_at(kappa)) * axes[1].lobe[:, None] * axes[0].lobe
-            total, order_0, power = (
-                np.abs(part).astype(np.float32) ** 2 * weight
-                for part in (field, mean, field - mean)
-            )
-            if self._apart:
-                return power, float(order_0.sum()), total - order_0 - power
-            # order 0 is the mean's lobe, or all light where the speckle is darker than that
-            order_0 = np.minimum(order_0, total)
-            return total - order_0, float(order_0.sum()), np.zeros_like(total)
-        # a scan's sharpened powers may be below 0, and their sum is right
-        power = expansion.power_of(parts)
-        if len(axes[0].frequency) < nx:
-            power = power @ axes[0].matrix.T
-        if len(axes[1].frequency) < ny:
-            power = axes[1].matrix @ power
-        return power, centre, np.zeros(0, np.float32)
+    parts = parts_at(table, kappa)
+    if table.grid.overlapping:
+        amplitude = parts[..., 0] + 1j * parts[..., 1]
+        amplitude[table.grid.middle] = centre = complex(*table.order_0_at(kappa))
+        field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
+        weight = axes[0].weight * axes[1].weight
+        mean = centre * axes[1].lobe[:, None] * axes[0].lobe
+        total, order_0, power = (
+            np.abs(part).astype(np.float32) ** 2 * weight for part in (field, mean, field - mean)
+        )
+        if apart:
+            return power, float(order_0.sum()), total - order_0 - power
+        # order 0 is the mean's lobe, or all light where the speckle is darker than that
+        order_0 = np.minimum(order_0, total)
+        return total - order_0, float(order_0.sum()), np.zeros_like(total)
+    # a scan's sharpened powers may be below 0, and their sum is right
+    power = table.expansion.power_of(parts)
+    if len(axes[0].frequency) < power.shape[1]:
+        power = power @ axes[0].matrix.T
+    if len(axes[1].frequency) < power.shape[0]:
+        power = axes[1].matrix @ power
+    return power, float(order_0_power(table, kappa)), np.zeros(0, np.float32)
 
 
 def _splat(

@@ -49,15 +49,22 @@ def order_0_power(table: DiffractionTable, kappa: ArrayLike) -> NDArray[np.float
     return np.maximum(table.expansion.power_of(table.order_0_at(kappa)), 0.0)
 
 
+def parts_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
+    """Return powers, or parts of amplitudes, of all orders but order 0, (ny, nx, components).
+
+    kappa : rad/µm.
+    """
+    weights = (table.expansion.weights(kappa) / table.scale).astype(np.float32)
+    coefficients = table.coefficients[int(table.expansion.interval(kappa))]
+    return series_sum(coefficients.astype(np.float32), weights)
+
+
 def powers_at(table: DiffractionTable, kappa: float) -> NDArray[np.float32]:
     """Return |a_j(κ)|² of all orders but order 0, (ny, nx); kappa : rad/µm.
 
     Sharpened powers of a scan may be negative.
     """
-    interval = int(table.expansion.interval(kappa))
-    weights = (table.expansion.weights(kappa) / table.scale).astype(np.float32)
-    parts = series_sum(table.coefficients[interval].astype(np.float32), weights)
-    return table.expansion.power_of(parts)
+    return table.expansion.power_of(parts_at(table, kappa))
 
 
 def scattered_share(

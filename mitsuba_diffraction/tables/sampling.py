@@ -82,14 +82,14 @@ def proposals(table: DiffractionTable) -> Proposals:
     levels = np.zeros((bands, counts[1], -(-counts[0] // 4) * 4), np.uint8)
     units = np.zeros(bands, np.float32)
     for band in range(bands):
-        band_levels = _levels(_cell_power(table, matrices, BANDED * (band + 0.5) / bands))
+        band_levels = _levels(_cell_power(table, matrices, band_shares(band, bands)))
         levels[band, :, : counts[0]] = band_levels
         power = density_of(band_levels)
         of_row = power.sum(axis=1)
         if of_row.sum() > 0.0:
             units[band] = 1.0 / of_row.sum()
-            rows[band] = _cumulative(of_row)
-            columns[band] = _cumulative(power)
+            rows[band] = cumulative(of_row)
+            columns[band] = cumulative(power)
     lobes = (x.lobes, y.lobes)
     # close enough together for a share of the samples
     kappas = np.linspace(0.0, table.expansion.kappa_max, _ORDER_0_KAPPAS)
@@ -130,13 +130,18 @@ def density_of(levels: NDArray[np.uint8] | np.uint8) -> NDArray[np.float64]:
     return (np.asarray(levels, np.uint32) << SHIFT).view(np.float32).astype(float)
 
 
+def band_shares(band: int, bands: int) -> NDArray[np.float64]:
+    """Return a few κ of a band, as shares of the largest."""
+    shares = BANDED * (band + 0.5) / bands + _SPREAD * np.linspace(-0.75, 0.75, _KAPPAS)
+    return np.asarray(np.clip(shares, 0.02, 1.0), np.float64)
+
+
 def _cell_power(
-    table: DiffractionTable, matrices: list[scipy.sparse.csr_array], centre: float
+    table: DiffractionTable, matrices: list[scipy.sparse.csr_array], shares: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Mean window sum in each cell (ny, nx) around a share of κ_max, without order 0."""
+    """Mean window sum in each cell (ny, nx) at shares of κ_max, without order 0."""
     expansion = table.expansion
-    shares = centre + _SPREAD * np.linspace(-0.75, 0.75, _KAPPAS)
-    kappas = np.clip(shares, 0.02, 1.0) * expansion.kappa_max
+    kappas = shares * expansion.kappa_max
     intervals = expansion.interval(kappas)
     weights = expansion.weights(kappas) / table.scale
     total: NDArray[np.float64] = np.zeros(())
@@ -178,7 +183,7 @@ def _cell_matrix(
     return scipy.sparse.csr_array(weights.astype(np.float32))
 
 
-def _cumulative(power: NDArray[np.float64]) -> NDArray[np.float32]:
+def cumulative(power: NDArray[np.float64]) -> NDArray[np.float32]:
     """Running sums along the last axis, from exactly 0 to exactly 1; 0 where there is none."""
     sums = np.cumsum(power, axis=-1)
     total = sums[..., -1:]

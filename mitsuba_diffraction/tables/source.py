@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -101,8 +101,11 @@ class TableRequest:
 
     def cached(self, settings: TableSettings) -> DiffractionTable:
         """Return the table with these settings, from the cache or built."""
-        names = self.source.names
-        return cached_table(self.digest, settings, lambda: self.built(settings), names)
+        parts = self.digest, asdict(settings), TAPER, LOOKUP, SHARPENING, LEAST_HALF
+        key = key_of(FORMAT_VERSION, *parts)
+        found = cached("table", key, _tables, lambda: self.built(settings), to_record, from_record)
+        # the file in the cache has no names: patches of other names may be equal
+        return named(found, self.source.names)
 
     def built(self, settings: TableSettings) -> DiffractionTable:
         """Build the table with these settings; warnings are one line for a file."""
@@ -134,20 +137,6 @@ def providing(provider: TableProvider) -> Iterator[None]:
         yield
     finally:
         _providers.remove(provider)
-
-
-def cached_table(
-    digest: str,
-    settings: TableSettings,
-    build: Callable[[], DiffractionTable],
-    names: Sequence[str],
-) -> DiffractionTable:
-    """Return the table of heights with this digest, from memory, from disk, or built and stored.
-
-    names : of the patches. The file in the cache has none: patches of other names may be equal.
-    """
-    key = key_of(FORMAT_VERSION, digest, asdict(settings), TAPER, LOOKUP, SHARPENING, LEAST_HALF)
-    return named(cached("table", key, _tables, build, to_record, from_record), names)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:

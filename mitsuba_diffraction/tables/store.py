@@ -1,8 +1,8 @@
 """Cache of what takes long to compute, in files named by a digest of their inputs.
 
-A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
-lie in memory. A damaged file, or one under another's name, is rebuilt. Whoever stores something
-packs it into a `Record`: this module knows no class.
+A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays, as
+NumPy saves them (NPY). A damaged file, or one under another's name, is rebuilt. Whoever stores
+something packs it into a `Record`: this module knows no class.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import math
 import os
 import threading
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import dataclass
+from io import BufferedRandom, BufferedReader
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -37,9 +37,8 @@ PATIENCE = 5.0
 
 SUFFIX = ".cache"
 _MAGIC = "mitsuba_diffraction cache"
-#: Bytes that the first line is filled up to, and the second, a number; arrays begin at multiples of
-#: the last.
-_HEAD, _ALIGNMENT = 256, 64
+#: Bytes that the first line is filled up to.
+_HEAD = 256
 
 T = TypeVar("T")
 _making: dict[tuple[str, str], threading.Lock] = {}
@@ -108,7 +107,8 @@ def _from_disk(
     folder = cache_folder()
     if folder is None:
         return make()
-    path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
+    # files of an earlier layout are called by the first half of their keys
+    path, title = folder / f"{kind}-{key[-32:]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
     value = found(path, title, unpack)
     if value is None:
         with _locked(path):
@@ -180,18 +180,15 @@ def read_record(path: Path, title: str) -> Record:
     """
     if not path.is_file():
         raise FileNotFoundError
-    content = np.fromfile(path, np.uint8)
-    if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:].data]):
-        raise ValueError("its checksum or its key is another's")
-    length = int(content[_HEAD : 2 * _HEAD].tobytes())
-    place = 2 * _HEAD + _aligned(length)
-    header = json.loads(content[2 * _HEAD : 2 * _HEAD + length].tobytes())
     arrays = []
-    for kind, shape in header["arrays"]:
-        size = math.prod(shape) * np.dtype(kind).itemsize
-        arrays.append(content[place : place + size].view(kind).reshape(shape))
-        place += _aligned(size)
-    return Record(header["document"], arrays)
+    with open(path, "rb") as file:
+        if file.read(_HEAD) != _head(title, file):
+            raise ValueError("its checksum or its key is another's")
+        file.seek(_HEAD)
+        while file.peek(1):
+            arrays.append(np.load(file))
+    text, *rest = arrays
+    return Record(json.loads(text.tobytes()), rest)
 
 
 def write_record(path: Path, title: str, record: Record) -> None:
@@ -199,30 +196,21 @@ def write_record(path: Path, title: str, record: Record) -> None:
 
     Raises a DiffractionError if it cannot be written.
     """
-    arrays = [np.ascontiguousarray(array) for array in record.arrays]
-    shapes = [[array.dtype.str, array.shape] for array in arrays]
-    text = json.dumps({"document": record.document, "arrays": shapes}).encode()
-    contents: list[bytes | memoryview] = [text]
-    contents += [array.reshape(-1).view(np.uint8).data for array in arrays]
-    blocks: list[bytes | memoryview] = [str(len(text)).encode().ljust(_HEAD)]
-    for block in contents:
-        blocks += [block, bytes(_aligned(len(block)) - len(block))]
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        file.write(_head(title, blocks))
-        file.writelines(blocks)
+    text = np.frombuffer(json.dumps(record.document).encode(), np.uint8)
+    with atomic_path(path) as temporary, open(temporary, "w+b") as file:
+        file.write(bytes(_HEAD))
+        for array in (text, *record.arrays):
+            np.save(file, array)
+        head = _head(title, file)
+        file.seek(0)
+        file.write(head)
 
 
-def _head(title: str, blocks: Sequence[bytes | memoryview]) -> bytes:
-    """Return the first line, filled up to `_HEAD` bytes."""
-    content = hashlib.sha256()
-    for block in blocks:
-        content.update(block)
-    return f"{title} {content.hexdigest()}".encode().ljust(_HEAD - 1) + b"\n"
-
-
-def _aligned(size: int) -> int:
-    """Return the least multiple of `_ALIGNMENT` that is not below a size."""
-    return -(-size // _ALIGNMENT) * _ALIGNMENT
+def _head(title: str, file: BufferedReader | BufferedRandom) -> bytes:
+    """Return the first line of a file, filled up to `_HEAD` bytes."""
+    file.seek(_HEAD)
+    digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return f"{title} {digest}".encode().ljust(_HEAD - 1) + b"\n"
 
 
 def _prune(folder: Path) -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.materials import METALS, TISSUES
-from mitsuba_diffraction.plugin.conductors import tabulated_range
+from mitsuba_diffraction.plugin.conductors import is_tabulated
 from mitsuba_diffraction.plugin.pigment import pigment_bsdf, pigment_range
 from mitsuba_diffraction.reference import fresnel
 
@@ -19,7 +19,7 @@ FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
 
 
 def test_plain_names_are_tabulated_conductors(some_variant):
-    assert all(tabulated_range(symbol) for symbol in METALS.values())
+    assert all(is_tabulated(symbol) for symbol in METALS.values())
 
 
 @pytest.mark.parametrize("name", TISSUES)

@@ -17,7 +17,7 @@ from mitsuba_diffraction.optics.materials import TISSUES
 from mitsuba_diffraction.plugin.boundary import HeightStatistic
 from mitsuba_diffraction.plugin.conductors import tabulated_index
 from mitsuba_diffraction.plugin.direction_lookup import DirectionLookup
-from mitsuba_diffraction.plugin.directions import PatchFrame, Site, TablePoint
+from mitsuba_diffraction.plugin.directions import PatchFrame, Site
 from mitsuba_diffraction.plugin.energy import _excess_of, reflectors_of
 from mitsuba_diffraction.plugin.energy_factors import ScaleRange
 from mitsuba_diffraction.plugin.power import power_model
@@ -65,7 +65,7 @@ def test_order_0_and_weights_of_each_interval_are_the_table_s():
 def test_the_statistic_of_heights_is_the_table_s_at_every_frequency():
     roughness = load(int_ior=1.5).table.roughness
     for q in np.geomspace(0.05, 60.0, 12):
-        place = TablePoint(mi.Vector2f(0.6 * q / 11.0, 0.8 * q / 11.0), 1.5)
+        place = mi.Vector2f(0.6 * q / 11.0, 0.8 * q / 11.0), 1.5
         (found,) = HeightStatistic(roughness).at(place, 2.0, [11.0])
         assert found.kappa == pytest.approx(33.0)
         assert found.variance == pytest.approx(roughness.at(q), rel=1e-4)
@@ -103,8 +103,8 @@ def test_in_colours_orders_and_order_0_of_a_window_add_up_to_the_table_s():
     mi.set_variant("scalar_rgb")
     power = power_model(speckle(), 550.0)
     for u, v, w in PLACES.tolist():
-        place = TablePoint(mi.Vector2f(u, v), w)
-        parts = power.power(place, 1.0, mi.SurfaceInteraction3f())
+        pair = SimpleNamespace(place=(mi.Vector2f(u, v), w))
+        parts, _ = power.answers(pair, 1.0, 1.0, mi.SurfaceInteraction3f(), "v")
         others, zeroth, cosine = (np.ravel(part) for part in parts)
         total = others + zeroth + 2.0 * cosine * np.sqrt(np.abs(others * zeroth))
         assert_allclose(total, colours.colour(u, v, w)[0], atol=2e-3)
@@ -120,8 +120,8 @@ def test_densities_over_a_stretched_patch_are_those_over_the_table_times_the_are
     def density(stretch):
         frame = PatchFrame((1.0, 0.0), stretch)
         pair = SimpleNamespace(uv=mi.Vector2f(0.3, -0.2), w=1.5, cos_i=0.8, cos_o=0.7, asked=True)
-        pair.frame = frame
-        return power.density(pair, 1.0, si)
+        pair.frame, pair.outer = frame, pair
+        return power.answers(pair, 1.0, 1.0, si, "d")[1]
 
     assert density(1.0) > 0.0
     assert density(0.7) == pytest.approx(0.49 * density(1.0))

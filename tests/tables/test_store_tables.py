@@ -14,8 +14,9 @@ from mitsuba_diffraction import (
     DiffractionTable,
     HeightField,
 )
+from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.settings import TableSettings
-from mitsuba_diffraction.tables import source, store
+from mitsuba_diffraction.tables import TableRequest, TableSource, source, store
 from tests.support.directions import rough_patch
 
 PATCH = rough_patch((20, 20), (0.08, 0.08), 0.1)
@@ -41,9 +42,14 @@ class Builder:
         return DiffractionTable.build(self.heights, **self.arguments)
 
     def table(self):
-        settings = TableSettings(**self.arguments)
-        names = [self.heights.name]
-        return source.cached_table(self.heights.digest(), settings, self, names)
+        builder, settings = self, TableSettings(**self.arguments)
+
+        class Counted(TableRequest):
+            def built(self, settings):
+                return builder()
+
+        request = Counted(TableSource.of(self.heights), settings, 1.0, 1.0, silent)
+        return request.cached(settings)
 
 
 def test_a_later_process_reads_it_from_disk_under_its_own_name(folder):
@@ -163,6 +169,7 @@ def test_each_setting_and_the_heights_make_another_key(monkeypatch):
         settings = TableSettings()
         if name is not None:
             object.__setattr__(settings, name, "another")  # whatever may be asked for
-        source.cached_table("heights", settings, lambda: None, ())
-    source.cached_table("others", TableSettings(), lambda: None, ())
+        TableRequest(TableSource.of(PATCH), settings, 1.0, 1.0, silent).cached(settings)
+    settings, other = TableSettings(), TableSource.of(rough_patch((8, 8), (0.1, 0.1), 0.1))
+    TableRequest(other, settings, 1.0, 1.0, silent).cached(settings)
     assert len(set(keys)) == len(names) + 2

@@ -232,11 +232,9 @@ class _ByCosine:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._model, name)
 
-    def density(self, pair: Any, height_scale: Any, si: Any) -> Any:
-        return mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
-
-    def both(self, pair: Any, height_scale: Any, drawing_scale: Any, si: Any) -> Any:
-        return self.power(pair, height_scale, si), self.density(pair, drawing_scale, si)
+    def answers(self, pair: Any, *others: Any) -> Any:
+        power, _ = self._model.answers(pair, *others)
+        return power, mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
 
 
 def deviation_of(

@@ -70,8 +70,8 @@ from ...plugin.base import SurfaceBSDF, asked_sides
 from ...plugin.description import Surface
 from ...plugin.dictionary import ORDERS, Data
 from ...plugin.directions import Pair, PatchFrame, Site
-from ...plugin.parameters import mono_wavelength, nested_of, orientation_of, resolved_path
-from ...plugin.properties import class_of
+from ...plugin.parameters import mono_wavelength, nested_of, orientation_of
+from ...plugin.properties import class_of, resolved_path
 from ...plugin.sampling import direction_of
 from ...plugin.types import (
     Colour,
@@ -123,7 +123,7 @@ class DiffractionOrders(SurfaceBSDF):
         self.orientation, self.transmits = orientation_of(props), self.table.sides == 2
         window = OrderLobe(self.table, self.coherence_width)
         self._lobes = _lobes_of(window, mono_wavelength(props, self.table.wavelengths))
-        self.parameters += self.orientation.changeable
+        self.parameters.append(self.orientation)
         if mi.is_polarized and not self.table.polarised:
             _warn_of_polarisation()
         _warn_of_wavelengths(self.table)

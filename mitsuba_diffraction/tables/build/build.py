@@ -42,7 +42,7 @@ from .coefficients import coefficients_of, half_precision
 from .describe import describe, roughness_of
 from .error import FLOOR, ErrorMeter, Parts, worst
 from .powers import PatchSpectra
-from .screens import Run, Screens, screens_of
+from .screens import Run, Screens
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
 DOUBLE_BELOW = 2e-4
@@ -244,10 +244,11 @@ def build_with(
             "workers build tables of windows: give a scan (periodic=open), or windows=W, or do "
             "without workers"
         )
-    screens = screens_of(scans, settings, run)
     check_units(scans)
+    width = None if settings.taper_width is None else settings.width
+    screens = Screens(scans, width, run)
     try:
-        check_window(screens.extent, settings)
+        check_window(scans[0], settings)
         table = _built(_Wanted(screens, settings), progress or silent)
     except DiffractionError as error:
         questions = [question for patch in scans if (question := units_warning(patch))]
@@ -288,7 +289,7 @@ def _first(wanted: _Wanted) -> _Setting:
         trims = trims_for(steps, taps, tolerance * TRIMMED_SHARE, coherent)
     spare = tolerance - reach_error(steps, taps, coherent)
     budget = SERIES_SHARE * max(spare, tolerance * TAPS_SHARE)
-    asked = (wanted.deepest, settings.coherence, wanted.kappa_max, budget, settings.terms)
+    asked = (wanted.deepest, wanted.kappa_max, budget, settings.terms)
     functions = None
     if settings.basis == "taylor":
         expansion = taylor_expansion(*asked)
@@ -301,7 +302,7 @@ def _first(wanted: _Wanted) -> _Setting:
                 f"{rounding:.2g} in single precision; use basis='svd'"
             )
     else:
-        expansion, functions = series_expansion(*asked, settings.basis)
+        expansion, functions = series_expansion(*asked, settings)
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
     return _Setting(expansion, functions, half, taps, trims)
 

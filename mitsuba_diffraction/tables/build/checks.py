@@ -29,26 +29,27 @@ HOPELESS_SLOPE, HOPELESS_RANGE = 100.0, 50.0
 
 
 def check_patches(patches: Sequence[HeightField], settings: TableSettings) -> None:
-    """Refuse patches that tile the plane if their powers cannot be averaged."""
+    """Refuse patches or windows whose powers cannot be averaged, by resolved settings."""
     if not patches:
         raise build_error("there is no height field; give at least one")
-    taylor = settings.basis == "taylor"
-    for patch in patches:
-        if taylor and patch.cut_out and not settings.coherent:
-            raise build_error(
-                f"'{patch.name}' is a part of a larger surface: the powers of its windows are "
-                "averaged, which basis='taylor' cannot; use basis='svd', coherence='patch', or "
-                "heights that repeat"
-            )
-    if len(patches) == 1 or settings.taper_width is not None:
-        return
+    several, taylor = len(patches) > 1, settings.basis == "taylor"
+    parts = [patch.name for patch in patches if patch.cut_out and not settings.coherent]
     if settings.coherent or taylor:
         setting = "basis='taylor'" if taylor else f"coherence='{settings.coherence}'"
-        raise build_error(
-            f"{len(patches)} patches have their powers averaged, which {setting} cannot; use "
-            "coherence='ensemble' and basis='svd', or one patch"
-        )
-    for patch in patches[1:]:
+        averaged = ""
+        if settings.taper_width is not None:
+            averaged, remedy = "windows have", "leave windows out"
+        elif parts:
+            averaged = f"the windows of '{parts[0]}', a part of a larger surface, have"
+            remedy = "coherence='patch', or heights that repeat (periodic=exact)"
+        elif several:
+            averaged, remedy = f"{len(patches)} patches have", "one patch"
+        if averaged:
+            raise build_error(
+                f"{averaged} their powers averaged, which {setting} cannot; use "
+                f"coherence='ensemble' and basis='svd', or {remedy}"
+            )
+    for patch in patches[1:] if settings.taper_width is None else []:
         if not np.allclose(patch.extent, patches[0].extent, rtol=1e-6):
             raise build_error(
                 f"'{patch.name}' is {patch.extent[0]:.6g} × {patch.extent[1]:.6g} µm, but "
@@ -67,13 +68,17 @@ def check_units(patches: Sequence[HeightField]) -> None:
             )
 
 
-def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
+def check_window(field: HeightField, settings: TableSettings) -> None:
     """Refuse a patch that is much smaller or larger than the coherence window, by its size alone.
 
-    extent : µm, along x and y.
+    settings : resolved.
 
     Raises a DiffractionError if no table of such a patch could be rendered with.
     """
+    extent = field.extent
+    if settings.taper_width is not None:  # the period of transforms, with zeros around a window
+        dx, dy = field.pixel_size
+        extent = 2.0 * max(settings.width, 2.0 * dx), 2.0 * max(settings.width, 2.0 * dy)
     width = settings.width
     # The longer side: a grating is a few pixels high, and constant along them
     if width > MOST_PATCHES * max(extent):
@@ -86,14 +91,6 @@ def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
     taps = taps_for((x, y), settings.tolerance * TAPS_SHARE, settings.coherent)
     if settings.taps is None and max(taps) > MAX_TAPS:
         raise too_wide(extent, settings, taps)
-
-
-def period_of(field: HeightField, settings: TableSettings) -> tuple[float, float]:
-    """Return the period (x, y) of the transforms by resolved settings, µm."""
-    if settings.taper_width is None:
-        return field.extent
-    x, y = (2.0 * max(settings.width, 2.0 * pixel) for pixel in field.pixel_size)
-    return x, y
 
 
 def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[str]:
@@ -109,7 +106,7 @@ def warnings_of(scans: Sequence[HeightField], settings: TableSettings) -> list[s
     lines = [line for scan in shown for line in scan.validity(settings.wavelength_range)]
     try:
         check_units(scans)
-        check_window(period_of(scans[0], settings), settings)
+        check_window(scans[0], settings)
     except DiffractionError:
         return []
     lines.append(window_warning(settings.width, scans))

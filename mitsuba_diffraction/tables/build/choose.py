@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError, counted
 from ...heights.field import HeightField
+from ...settings import TableSettings
 from ..expansion import Expansion, principal_functions
 from ..table import build_error
 from .error import FLOOR
@@ -34,11 +35,10 @@ _Maker = Callable[[int, int], Expansion]
 
 def series_expansion(
     heights: HeightField,
-    coherence: str,
     kappa_max: float,
     budget: float,
     terms: int | None,
-    basis: str,
+    settings: TableSettings,
 ) -> tuple[Expansion, int | None]:
     """Return the initial Chebyshev series, and the number of `svd` functions, if any.
 
@@ -46,14 +46,14 @@ def series_expansion(
     has the last word (`tables.build`). Unless the user says how many functions, there are as many
     as make the smallest table, the fewer if that makes no difference.
     """
-    kind = "power" if coherence == "ensemble" else "amplitude"
+    kind = "amplitude" if settings.coherent else "power"
 
     def make(terms: int, intervals: int) -> Expansion:
         return Expansion("chebyshev", kind, terms, intervals, kappa_max, 0.5 * heights.range)
 
     if heights.range == 0.0:
         return make(terms or SMALL_PACKET, 1), None
-    trial, svd = _Trial(heights, kappa_max), basis != "chebyshev"
+    trial, svd = _Trial(heights, kappa_max), settings.basis != "chebyshev"
 
     def series(count: int, intervals: int) -> Expansion:
         length = max(count + 2, trial.length(make, intervals, budget)) if svd else count
@@ -105,7 +105,7 @@ def too_many_intervals(expansion: Expansion, terms: int, error: float) -> Diffra
 
 
 def taylor_expansion(
-    heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
+    heights: HeightField, kappa_max: float, budget: float, terms: int | None
 ) -> Expansion:
     """The Taylor series with as many terms as bring a bound below the budget.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,30 +15,20 @@ from .powers import PatchSpectra, alternate
 from .spectrum import GLOSSY_RADIUS
 
 
-class Coefficients(NamedTuple):
-    """Series coefficients of a table.
-
-    Attributes
-    ----------
-    bins : (intervals, ny, nx, components, terms) of every bin, 0 for order 0.
-    order_0 : (intervals, components, series_terms).
-    expansion : of the bins, with its functions.
-    """
-
-    bins: NDArray[np.float32]
-    order_0: NDArray[np.float64]
-    expansion: Expansion
-
-
 def coefficients_of(
     spectra: PatchSpectra, grid: Grid, expansion: Expansion, functions: int | None
-) -> Coefficients:
+) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
     """Series coefficients of every bin, and of order 0.
 
-    functions : number of functions of basis "svd", or None; the expansion returned then has them.
+    functions : number of functions of basis "svd", or None.
+
+    Returns
+    -------
+    Coefficients (intervals, ny, nx, components, terms), 0 for order 0; order 0's (intervals,
+    components, series_terms); and the expansion of the bins, with its functions.
     """
     if expansion.basis == "taylor":
-        return Coefficients(*_taylor(spectra, grid, expansion), expansion)
+        return *_taylor(spectra, grid, expansion), expansion
     components, terms = expansion.components, functions or expansion.terms
     near = _near(grid, components)
     inner = _inner(spectra, grid)
@@ -72,7 +62,7 @@ def coefficients_of(
         np.matmul(flat.T, fit.astype(np.float32), out=result[interval].reshape(-1, terms))
     if functions is not None:
         expansion = replace(expansion, basis="svd", terms=terms, functions=np.array(all_series))
-    return Coefficients(result, order_0, expansion)
+    return result, order_0, expansion
 
 
 def _taylor(

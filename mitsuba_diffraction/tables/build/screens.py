@@ -28,7 +28,6 @@ from ...heights.coherence import SHARPENING, TAPER, window_corners, window_place
 from ...heights.preprocess import plane_of
 from ...optics.blend import ScaleRoughness
 from ...optics.geometry import sigma_of, wavenumber
-from ...settings import TableSettings
 from ..table import build_error
 from .spectrum import GLOSSY_RADIUS, Spectrum, Tapers, filled
 
@@ -211,13 +210,11 @@ class Screens:
         last = [min(int(kappa / q), n // 2) for q, n in zip(bins, self.tile, strict=True)]
         lobe = [1.0 / (math.sqrt(2.0) * sigma * q) for q in bins]
         scatter = partial(_scatter, (last[1], last[0]), kappa, lobe)
-        count, mean, squares = 0, np.zeros(1), np.zeros(1)
-        for more, their_mean, their_squares in self.run(scatter, self.batches()):
-            # Chan, Golub & LeVeque (1983, The American Statistician 37, 242), equation 2.1
-            change, count = their_mean - mean, count + more
-            mean = mean + change * (more / count)
-            squares = squares + their_squares + np.square(change) * (more * (count - more) / count)
-        error = np.sqrt(squares / (count - 1) * self.variance_factor)
+        sums: Any = sum(self.run(scatter, self.batches()))
+        count = len(self)
+        mean, squares = sums / count
+        variance = np.maximum(squares - mean**2, 0.0) * (count / (count - 1))
+        error = np.sqrt(variance * self.variance_factor)
         y, x = (q * np.arange(-n, n + 1) for q, n in zip(bins, last, strict=True))
         near = np.hypot(x, y[:, None]) <= GLOSSY_RADIUS / sigma
         return {
@@ -286,32 +283,11 @@ def _pairs(along_y: _Axis, along_x: _Axis) -> float:
     return float((taken * both).sum())
 
 
-def _scatter(
-    last: tuple[int, int], kappa: float, lobe: Sequence[float], windows: Screens
-) -> tuple[int, Real, Real]:
-    """Number of windows, mean and sum of squared deviations of what look-ups find in them."""
-    mean, squares = np.zeros(1), np.zeros(1)
+def _scatter(last: tuple[int, int], kappa: float, lobe: Sequence[float], windows: Screens) -> Real:
+    """Sums over windows of what look-ups find in them, and of its square, (2, ny, nx)."""
+    sums: Real = np.zeros(2)[:, None, None]
     for n in range(len(windows)):
         power = np.abs(windows.spectrum(n, last).of_phase(kappa)) ** 2
         power = scipy.ndimage.gaussian_filter(power.astype(np.float64), lobe, mode="constant")
-        change = power - mean
-        mean = mean + change / (n + 1)
-        squares = squares + change * (power - mean)
-    return len(windows), mean, squares
-
-
-def screens_of(scans: Sequence[HeightField], settings: TableSettings, run: Run = map) -> Screens:
-    """Return the windows of scans by resolved settings; the patches if they tile the plane.
-
-    run : what does their work.
-
-    Raises a DiffractionError if their powers cannot be averaged.
-    """
-    if settings.taper_width is None:
-        return Screens(scans)
-    if settings.coherent or settings.basis == "taylor":
-        raise build_error(
-            "windows have their powers averaged, which coherence='patch' and basis='taylor' "
-            "cannot; use coherence='ensemble' and basis='svd', or leave windows out"
-        )
-    return Screens(scans, settings.width, run)
+        sums = sums + np.stack([power, power**2])
+    return sums

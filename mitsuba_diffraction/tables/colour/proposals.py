@@ -13,17 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..sampling import band_shares, cumulative
 from .table import PACKET, TERMS, ColourTable
 
 #: Weights of the channels: between the luminance (0.21, 0.72, 0.07) and equal noise in all three.
 IMPORTANCE = (0.25, 0.55, 0.2)
-#: Bands of z up to `BANDED` of the largest, as in `tables.proposals`.
-BANDS, BANDED = 6, 0.75
+#: Bands of z up to `sampling.BANDED` of the largest.
+BANDS = 6
 #: Wavelengths (µm) whose lobes make up order 0's.
 LOBES = (0.45, 0.52, 0.57, 0.63)
-
-_ZS = 4  # averaged in a band
-_SPREAD = 0.25  # half width of a band's average, as a share of the largest z
 
 
 @dataclass(frozen=True)
@@ -51,10 +49,7 @@ def colour_proposals(table: ColourTable) -> ColourProposals:
     rings = np.zeros((BANDS, grid.rings), np.float32)
     azimuths = np.zeros((BANDS, grid.bins), np.float32)
     for band in range(BANDS):
-        # brightness over the band's range of z
-        centre = BANDED * (band + 0.5) / BANDS
-        shares = np.clip(centre + _SPREAD * np.linspace(-0.75, 0.75, _ZS), 0.02, 1.0)
-        bright = brightness(table, shares * table.expansion.kappa_max)
+        bright = brightness(table, band_shares(band, BANDS) * table.expansion.kappa_max)
         inside = []
         for start, count in zip(map(grid.start, range(grid.rings)), grid.counts, strict=True):
             values = bright[start : start + count + 1].astype(float)
@@ -64,14 +59,10 @@ def colour_proposals(table: ColourTable) -> ColourProposals:
             count = grid.counts[ring]
             cells = inside[ring] + _resampled(inside[ring + 1], count)
             start = grid.start(ring)
-            sums = np.cumsum(cells)
-            if sums[-1] > 0.0:
-                azimuths[band, start + 1 : start + count + 1] = sums / sums[-1]
-                # dA = r² d(ln r) dφ
-                power[ring] = sums[-1] / count * grid.radius(ring) ** 2
-        sums = np.cumsum(power)
-        if sums[-1] > 0.0:
-            rings[band, 1:] = sums / sums[-1]
+            azimuths[band, start : start + count + 1] = cumulative(cells)
+            # dA = r² d(ln r) dφ
+            power[ring] = np.cumsum(cells)[-1] / count * grid.radius(ring) ** 2
+        rings[band] = cumulative(power)
     return ColourProposals(rings, azimuths, rings[:, -1] > 0.0, _order_0(table))
 
 

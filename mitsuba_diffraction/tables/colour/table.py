@@ -143,7 +143,7 @@ class ColourTable:
         return self.expansion.kappa_max
 
     def colour(self, u: ArrayLike, v: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
-        """RGB (n, 3) in 1/µm² at u, v, z, each (n,), as `plugin.rgb.ColourLookup.colour`."""
+        """RGB (n, 3) in 1/µm² at u, v, z, each (n,), as `plugin.rgb.RGBPower`."""
         u, v, z = (np.atleast_1d(np.asarray(a, float)) for a in (u, v, z))
         radius, turn = np.hypot(u, v), np.arctan2(v, u) / (2 * np.pi) % 1.0
         grid = self.grid

@@ -13,7 +13,7 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build import powers as powers_module
 from mitsuba_diffraction.tables.build import screens as module
-from mitsuba_diffraction.tables.build.screens import Screens, screens_of
+from mitsuba_diffraction.tables.build.screens import Screens
 from tests.support.scans import PIXEL, SETTINGS, rough
 
 #: Width of a window, µm.
@@ -81,7 +81,7 @@ def test_the_width_of_windows_follows_the_scan_and_the_light(side, light, window
     settings = resolved(TableSettings(light), [field])
     assert settings.width == pytest.approx(window)
     assert settings.lookup_width == pytest.approx(LOOKUP * window)
-    assert len(screens_of([field], settings)) == count
+    assert len(Screens([field], settings.width)) == count
 
 
 def test_a_scan_that_is_not_square_has_windows_along_its_longer_side():
