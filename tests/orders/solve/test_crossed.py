@@ -8,11 +8,9 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.orders import cells
-from mitsuba_diffraction.orders.solve import crossed
 from mitsuba_diffraction.orders.solve.crossed import CrossedWaves
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.integral import IntegralSolver
-from mitsuba_diffraction.orders.solve.jobs import Jobs
 from mitsuba_diffraction.orders.solve.profiles import Profile, UnitCell
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import CrossedStation, Grating
@@ -108,43 +106,3 @@ def test_lumps_have_the_orders_of_ikarus():
         truth = np.mean([float(each.R_orders[each.order_index(-m, -n)]) for each in solved])
         # its 8 slices are within 3 % of 16
         assert share == pytest.approx(truth, rel=0.05, abs=1e-5)
-
-
-def test_an_interrupted_solution_goes_on(tmp_path):
-    flat, folder = HeightField(np.zeros((4, 4)), 0.05), tmp_path / "stored"
-    asked = {"theta": [0.0, 40.0], "settings": Settings((500.0, 500.0), resolution=3)}
-
-    def interrupt(done, total, text):
-        if done == 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        md.solve_orders(flat, 1.5, **asked, jobs=Jobs(folder, progress=interrupt))
-    assert len(list(folder.iterdir())) == 2
-    told = []
-    table = md.solve_orders(
-        flat, 1.5, **asked, jobs=Jobs(folder, progress=lambda *now: told.append(now[0]))
-    )
-    assert told[0] == 2
-    assert table.efficiency(0.0, 0.0, 500.0, 0, 0) == pytest.approx(0.04, rel=1e-3)
-    # another material has results of its own
-    told.clear()
-    md.solve_orders(
-        flat, 1.6, **asked, jobs=Jobs(folder, progress=lambda *now: told.append(now[0]))
-    )
-    assert told[0] == 0
-
-
-@pytest.mark.thorough
-def test_mirror_planes_give_the_light_of_mirrored_directions(monkeypatch):
-    blazed_along_y = HeightField(
-        0.05 * np.cos(2 * np.pi * X) + 0.06 * (Y < 1 / 3) + 0.03 * (Y < 2 / 3), 0.6 / PIXELS
-    )
-    assert [each is not None for each in crossed._mirrors(blazed_along_y.heights)] == [True, False]
-    settings = Settings((550.0, 550.0), resolution=3, polarised=True)
-    asked = {"theta": [0.0, 40.0], "phi": [50.0, 130.0, 290.0], "settings": settings}
-    mirrored = md.solve_orders(blazed_along_y, 1.5, **asked)
-    monkeypatch.setattr(crossed, "_mirrors", lambda heights: (None, None))
-    direct = md.solve_orders(blazed_along_y, 1.5, **asked)
-    # single precision
-    assert mirrored.response.values == pytest.approx(direct.response.values, abs=1e-7)
