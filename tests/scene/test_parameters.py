@@ -57,11 +57,6 @@ def test_a_given_value_chooses_the_include(scene):
     assert "colour" in parameters_of(scene, {"part": "other"})
 
 
-def test_a_scene_without_parameters_says_so(tmp_path):
-    with pytest.raises(DiffractionError, match="has no parameters"):
-        check_parameters(scene_file(tmp_path), {"spp": "1"})
-
-
 def test_a_circle_of_includes_ends(tmp_path):
     assert parameters_of(scene_file(tmp_path, '<include filename="scene.xml"/>')) is None
 

@@ -20,7 +20,6 @@ from mitsuba_diffraction.scene.passes import (
     added,
     render_pass,
     render_passes,
-    samples_per_pass,
 )
 from tests.support.room import QUICK, SCENE, pixels
 
@@ -118,15 +117,6 @@ def test_however_passes_are_cut_they_are_added_in_one_tree(count, sizes):
     expected = added(Span(0, count), whole).text
     assert Tree.most <= np.log2(count) + 3  # sums of the tree, the two that are added, their sum
     assert cut(Span(0, count), sorted(sizes, reverse=True)).text == expected
-
-
-def test_a_pass_of_one_size_divides_the_samples():
-    pixels = 512 * 512
-    mi.set_variant("llvm_ad_rgb")
-    assert [samples_per_pass(spp, pixels) for spp in (256, 100, 97, 4)] == [8, 5, 8, 4]
-    assert samples_per_pass(256, 10**9) == 1
-    mi.set_variant("scalar_rgb")
-    assert samples_per_pass(256, pixels) == 1
 
 
 def test_asked_to_stop_it_keeps_the_passes_so_far(scene):

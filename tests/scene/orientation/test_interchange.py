@@ -200,40 +200,6 @@ def test_the_axis_of_a_stage_is_its_own(tmp_path: Path) -> None:
     assert fit_of(mesh, tmp_path / "sheet.usda").up == "z"
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "package"),
-    [
-        ("bad.glb", b"glTF\2\0\0\0\xff\0\0\0nothing", "trimesh"),
-        ("bad.gltf", b'{"asset": {"version": "2.0"}, "meshes": 3}', "trimesh"),
-        ("empty.gltf", b'{"asset": {"version": "2.0"}}', "trimesh"),
-        ("lost.gltf", b'{"asset": {"version": "2.0"}, "buffers": [{"uri": "a.bin"}]}', "trimesh"),
-        ("bad.usda", b"#usda 1.0\n nothing", "pxr"),
-        ("bad.usdz", b"PK nothing", "pxr"),
-        ("empty.usda", b"#usda 1.0\n", "pxr"),
-    ],
-)  # fmt: skip
-def test_bad_files_are_refused_in_one_line(
-    tmp_path: Path, name: str, content: bytes, package: str
-) -> None:
-    pytest.importorskip(package)
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(DiffractionError, match=name) as caught:
-        load_mesh(tmp_path / name)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_missing_package_is_named_with_its_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import sys
-
-    blocked: Any = None
-    monkeypatch.setitem(sys.modules, "trimesh", blocked)
-    (tmp_path / "a.glb").write_bytes(b"glTF")
-    with pytest.raises(DiffractionError, match="extra gltf"):
-        load_mesh(tmp_path / "a.glb")
-
-
 SECRETS = ["../secret.bin", "{outside}/secret.bin", "link.bin", "%2e%2e/secret.bin", "pipe.bin"]
 
 

@@ -11,7 +11,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights import Recipe
-from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.optics.colour import linear_srgb
 from mitsuba_diffraction.scene.planning.light import (
     BINS,
     WAVELENGTHS,
@@ -20,14 +20,12 @@ from mitsuba_diffraction.scene.planning.light import (
 from mitsuba_diffraction.scene.planning.plan import (
     frequency_limit,
     load_by_recipes,
-    load_limited,
     outside,
     plan_table,
     quantiles,
     recipe_files,
     recipe_of,
 )
-from mitsuba_diffraction.scene.planning.report import wavelengths_needed
 from mitsuba_diffraction.tables import TableRequest
 from tests.support.directions import polar, rough_patch
 
@@ -209,14 +207,6 @@ def test_the_limit_is_a_quantile_of_the_light(lit):
     assert quantiles(np.arange(1000), np.ones(1000), [0.5]) == pytest.approx([500], abs=2)
 
 
-def test_wavelengths_that_the_eye_does_not_see_cost_no_colour():
-    needed = wavelengths_needed(response(0.5 * (WAVELENGTHS[1:] + WAVELENGTHS[:-1])).sum(axis=1))
-    low, high = needed["range_nm"]
-    assert 380.0 < low < 410.0
-    assert 680.0 < high < 720.0
-    assert needed["lost_colour"] < 0.5  # half of what an eye can just tell apart
-
-
 def test_where_all_of_a_table_is_asked_for_it_stays_whole(lit):
     class Unused(TableRequest):
         def cached(self, settings):
@@ -228,15 +218,6 @@ def test_where_all_of_a_table_is_asked_for_it_stays_whole(lit):
     assert plan_table(full, 1e-3).settings is None
     unseen = light_by_hand(full, np.zeros((BINS, BINS)))
     assert plan_table(unseen, 1e-3).table is lit.table
-
-
-def test_a_scene_is_loaded_with_the_limits_of_its_plan(lit):
-    planned = plan_table(lit, 1e-3)
-    (table,) = tables_of(load_limited(plate, [planned]))
-    assert table is planned.table
-    # one of other settings is none of the plan's
-    (other,) = tables_of(load_limited(lambda: plate(tolerance=1e-2), [planned]))
-    assert not other.limited
 
 
 def test_a_recipe_builds_the_planned_table_again(file, tmp_path):
