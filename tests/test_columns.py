@@ -118,12 +118,6 @@ def test_a_column_and_a_unit_are_chosen_by_name(tmp_path):
     assert choice_of("C:/x/a.csv:b c:%") == ("C:/x/a.csv", "b c", "%")
 
 
-def test_rows_of_missing_numbers_are_rows(tmp_path):
-    file = tmp_path / "a.txt"
-    file.write_text("nan nan nan\n1 2 3\n4 nan 6\n")
-    assert read_columns(file).numbers.shape == (3, 3)
-
-
 def test_all_columns_of_receptors_have_names_and_no_gaps(tmp_path):
     file = tmp_path / "a.csv"
     file.write_text('"","wl","u.v","s"\n"1",300,1,2\n"2",700,3,4\n')

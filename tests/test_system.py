@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import psutil
 import pytest
 
 from mitsuba_diffraction import system
@@ -100,20 +99,3 @@ def test_a_process_lives_until_it_has_ended():
         child.communicate(b"\n")
     assert not system.process_lives(child.pid)
     assert not system.process_lives(10**30)
-
-
-def test_peak_of_memory_is_at_least_what_is_held_now():
-    held = psutil.Process().memory_info().rss
-    assert held <= system.peak_memory() < psutil.virtual_memory().total
-
-
-def test_cores_are_those_of_the_process():
-    assert 1 <= system.cores() <= (os.cpu_count() or 1)
-
-
-def test_variables_of_the_environment_are_restored(monkeypatch):
-    monkeypatch.setenv("SET_BEFORE", "1")
-    with system.environment({"SET_BEFORE": "2", "NOT_SET_BEFORE": "3"}):
-        assert (os.environ["SET_BEFORE"], os.environ["NOT_SET_BEFORE"]) == ("2", "3")
-    assert os.environ["SET_BEFORE"] == "1"
-    assert "NOT_SET_BEFORE" not in os.environ

@@ -167,12 +167,6 @@ def test_ratios_and_weber_fractions_are_the_user_s():
             replace(eye, **wrong)
 
 
-def test_receptors_are_named_as_r_writes_columns(tmp_path):
-    file = tmp_path / "eye.csv"
-    file.write_text('"","wl","blue.tit.u","blue.tit.s"\n"1",300,1,0\n"2",700,1,1\n')
-    assert eye_of(str(file)).names == ("blue_tit_u", "blue_tit_s")
-
-
 @pytest.mark.parametrize(
     ("content", "named"),
     [
@@ -202,14 +196,6 @@ def test_eyes_are_names_or_files_and_see_what_spectra_cover(tmp_path):
         eye_of("dragon")
     with pytest.raises(DiffractionError, match="wavelength range must cover"):
         quantum_catches(eye_of("avian_uv"), [400.0, 700.0], [[1.0], [1.0]])
-
-
-def test_a_violet_sensitive_bird_s_cones_peak_where_they_were_measured():
-    """Hart 2002: 432, 477, 537 and 605 nm."""
-    peaks = GRID[eye_of("avian_v").sensitivity.argmax(axis=1)]
-    assert peaks[1:] == pytest.approx([477.0, 537.0, 605.0], abs=1.0)  # the grid's step
-    # a blue tit's media rise less in violet than a peafowl's, which were not to be had
-    assert peaks[0] == pytest.approx(432.0, abs=7.0)
 
 
 def test_lights_have_quanta_of_mean_1_and_the_sky_is_bluer_than_the_sun(tmp_path):
@@ -266,8 +252,3 @@ def test_a_grey_scene_is_grey_in_every_picture(name):
     for picture in pictures:
         assert np.ptp(picture, axis=2).max() < 1e-9
         assert np.ptp(picture) > 0.3
-
-
-def test_a_picture_of_a_column_of_pixels_is_no_larger_than_others():
-    figure = false_colour_figure(np.ones((5000, 1, 2)), eye_of("dog"))
-    assert figure.get_figheight() < 100.0

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.special import jv
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.analysis.spectra import check_wavelengths, mean_spectra
@@ -59,34 +58,6 @@ def test_a_cone_wider_than_the_lobe_collects_what_a_flat_surface_reflects(varian
         assert light.p[:, 0] == pytest.approx(p, rel=2e-3)
     mirror = md.spectrum(surface, 45.0, [45.0], acceptance=0.5, relative="mirror", wavelengths=LAM)
     assert mirror.value == pytest.approx(0.5 * (s + p), rel=2e-3)
-
-
-def test_a_cone_amid_the_mirror_s_lobe_collects_its_closed_form():
-    """P = 1 − exp(−σ²k²Δ²) around the normal, Δ the sine of the half angle."""
-    width = 10.0
-    raw = {"material": "none", "model": "kirchhoff", "energy_conserving": False}
-    surface = load(FLAT, coherence_width=width, **raw)
-    light = md.spectrum(surface, 0.0, [0.0], acceptance=4.0, relative="none", wavelengths=LAM)
-    sigma, k = 0.25 * width, 2e3 * np.pi / LAM
-    expected = 1.0 - np.exp(-((sigma * k * math.sin(math.radians(2.0))) ** 2))
-    assert light.value[:, 0] == pytest.approx(expected, rel=2e-3)
-
-
-def test_cones_around_orders_of_a_sinusoid_collect_its_bessel_functions():
-    """J_m(κa)² with κ = k (1 + cosθ); the period of eight wavelengths has no obliquity to 1 %."""
-    depth = 0.08
-    field = md.gratings.sinusoidal(period=8.0, depth=depth, periods=4)
-    surface = load(field, coherence_width=32.0, material="none", model="kirchhoff",
-                   energy_conserving=False)  # fmt: skip
-    lam = 560.0
-    first = math.degrees(math.asin(1e-3 * lam / 8.0))
-    light = md.spectrum(surface, 0.0, [0.0, first, -first], acceptance=3.8, relative="none",
-                        wavelengths=[lam])  # fmt: skip
-    kappa = 2e3 * math.pi / lam * (1.0 + math.cos(math.radians(first)))
-    expected = jv(1, 0.5 * kappa * depth) ** 2
-    assert light.value[0, 1] == pytest.approx(expected, rel=0.01)
-    assert light.value[0, 2] == pytest.approx(expected, rel=0.01)
-    assert light.value[0, 0] == pytest.approx(jv(0, 2e3 * math.pi / lam * depth) ** 2, rel=2e-3)
 
 
 def test_a_white_surface_is_a_white_standard():

@@ -119,17 +119,6 @@ def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path)
     assert "starts at 500 nm" in row["reason"]
 
 
-def test_the_command_writes_the_folder(run, scans, tmp_path):
-    ran = run(
-        "survey", *scans[:2], tmp_path / "none.npy", "-o", tmp_path / "out", "--pixel-size", PIXEL,
-        "--coherence-width", 6, "--tolerance", 0.05, "--resolution", 24,
-    )  # fmt: skip
-    assert ran.code == 1
-    assert "1 scan in survey.csv, 2 failed, 3 samples" in ran.out
-    assert "none.npy" in ran.err
-    assert "uncertain by some 15 %" in ran.err
-
-
 def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
     path = _toml(
         tmp_path,

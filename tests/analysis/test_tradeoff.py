@@ -44,10 +44,6 @@ def test_the_error_found_is_below_the_tolerance_that_was_asked_for(sample, toler
     assert 0.0 < error <= tolerance
 
 
-def test_the_error_of_twice_the_power_is_one(sample):
-    assert sample.error(2.0 * sample.exact) == pytest.approx((1.0, 1.0), abs=1e-12)
-
-
 def result(tolerance: float, relative: float, megabytes: float) -> MeasuredSetting:
     setting = TradeoffSetting("tolerance", {"tolerance": tolerance})
     return MeasuredSetting(setting, error=tolerance, relative=relative, megabytes=megabytes)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.cli import console, interrupt
+from mitsuba_diffraction.cli import interrupt
 from mitsuba_diffraction.heights.source import Source
 from tests.support import ROOT
 
@@ -175,25 +175,3 @@ def test_what_a_plugin_raises_while_a_scene_loads_is_not_swallowed(
     assert ran.code == code
     assert text in ran.err
     assert len(ran.err.splitlines()) == bool(text)
-
-
-@pytest.mark.parametrize(
-    ("line", "shown"),
-    [
-        ("give fill=nearest, or crop", "give --fill nearest, or crop"),
-        ("without max_height: give pixel_size=0.05", "without --max-height: give pixel_size=0.05"),
-        ("level: expected plane", "--level: expected plane"),
-        ("'a.toml': fill=hope must be", "'a.toml': fill=hope must be"),
-        ("solve it with polarised=True (slow)", "solve it with --polarised (slow)"),
-        ("leave -D fill=1 out", "leave -D fill=1 out"),
-        ("layer 1: fill='x' is unknown", "layer 1: fill='x' is unknown"),
-        ("the preset snake,fill=2 is unknown", "the preset snake,fill=2 is unknown"),
-    ],
-)
-def test_messages_name_the_options_of_the_command(line, shown):
-    names = ("fill", "level", "polarised", "max_height")
-    console.name_flags({name: f"--{name.replace('_', '-')}" for name in names})
-    try:
-        assert console.flagged(line) == shown
-    finally:
-        console.name_flags({})

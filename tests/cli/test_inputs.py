@@ -125,16 +125,6 @@ def test_a_name_that_is_no_utf_8_is_refused_in_one_line(run, here, command):
     assert "UTF-8" in line
 
 
-def test_loading_a_scene_whose_name_is_no_utf_8_is_refused(here):
-    from mitsuba_diffraction import DiffractionError
-    from mitsuba_diffraction.scene import load_scene
-
-    file = Path(os.fsdecode(b"caf\xe9.xml"))
-    file.write_text(SCENE.format(""))
-    with pytest.raises(DiffractionError, match="UTF-8"):
-        load_scene(file, {})
-
-
 MISSPELT = """<shape type="sphere"><bsdf type="twosided">
   <bsdf type="diffraction"><float name="int_iorr" value="1.5"/></bsdf>
 </bsdf></shape>"""

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import shlex
 import shutil
@@ -108,15 +107,6 @@ def test_links_to_an_input_are_that_input(run, world, link):
         line = run("tangents", pair[0], "-o", pair[1]).failed_in_one_line()
         assert "would overwrite" in line
     assert (world / "mesh.ply").read_text() == PLY
-
-
-def test_pictures_and_buffers_beside_a_gltf_are_inputs(run, world):
-    document = {"asset": {"version": "2.0"}, "images": [{"uri": "a%20b.png"}],
-                "buffers": [{"uri": "m.bin", "byteLength": 4}]}  # fmt: skip
-    Path("m.gltf").write_text(json.dumps(document))
-    shutil.copy("scale.png", "a b.png")
-    line = run("render", "m.gltf", "--preset", "cd", "-o", "a b.png").failed_in_one_line()
-    assert "would overwrite 'a b.png'" in line
 
 
 @posix

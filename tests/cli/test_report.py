@@ -124,6 +124,10 @@ def test_mitsuba_s_warnings_are_ours_and_said_once(capfd):
     with console.mitsuba_warnings():
         for _ in range(2):
             mi.Log(mi.LogLevel.Warn, "too few\nsamples")
+        for value in (-0.1, -0.2):  # of which Mitsuba tells each
+            mi.Log(mi.LogLevel.Warn, f"Invalid sample value: [{value}, 0, 0, 1]")
         mi.Log(mi.LogLevel.Info, "of no interest")
-    assert capfd.readouterr().err.splitlines() == ["mitsuba-diffraction: warning: too few samples"]
+    first, second = capfd.readouterr().err.splitlines()
+    assert first == "mitsuba-diffraction: warning: too few samples"
+    assert second.startswith("mitsuba-diffraction: warning: some samples are below zero")
     assert mi.logger().appender_count() == count

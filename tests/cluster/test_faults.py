@@ -17,9 +17,7 @@ import pytest
 
 from mitsuba_diffraction import (
     DiffractionError,
-    DiffractionTable,
     DiffractionWarning,
-    HeightField,
     cluster,
 )
 from mitsuba_diffraction.cluster import calls, groups, workers
@@ -27,13 +25,10 @@ from mitsuba_diffraction.cluster.jobs import WorkerCalls
 from mitsuba_diffraction.cluster.kept import Kept
 from mitsuba_diffraction.cluster.tasks import MissingFiles, SceneFiles, run_task
 from mitsuba_diffraction.scene.passes import Span
-from mitsuba_diffraction.settings import TableSettings
-from mitsuba_diffraction.tables.build.build import build_with
 from tests.cluster.clusters import VARIANT, film, passes_of_picture, picture_of, rendered
 from tests.support import ROOT
 from tests.support.machine import python
 from tests.support.room import SCENE
-from tests.support.scans import PIXEL, SETTINGS, rough
 
 pytestmark = pytest.mark.thorough
 
@@ -53,25 +48,6 @@ def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected, t
     client.wait_for_workers(3, timeout=300)
     np.testing.assert_array_equal(rendered(client, scene), expected)
     client.cluster.scale(2)
-
-
-def test_two_workers_of_which_one_is_killed_build_the_same_table(client):
-    scan, killed = HeightField(rough(300), PIXEL, name="scan", cut_out=True), []
-
-    def disturb(done, total, text):
-        if done >= 10 and not killed:
-            killed.append(next(iter(client.cluster.workers.values())).pid)
-            os.kill(killed[0], signal.SIGKILL)
-
-    work = WorkerCalls(client)
-    table = build_with(scan, TableSettings(**SETTINGS), disturb, work)
-    assert killed
-    alone = DiffractionTable.build(scan, **SETTINGS)
-    assert table.digest() == alone.digest()
-    assert table.error == alone.error
-    assert table.source == alone.source
-    assert work.report.tasks > 10
-    client.wait_for_workers(2, timeout=300)
 
 
 def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path, monkeypatch):

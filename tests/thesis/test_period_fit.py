@@ -115,20 +115,6 @@ def test_the_thesis_procedure_finds_the_blazed_period(of_blazed, blazed):
     assert fit.period == pytest.approx(2.5, rel=1e-3)  # they report 2500 nm
 
 
-def test_a_measured_scale_has_the_period_of_its_fingers(shared_afm):
-    patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
-    angles = np.linspace(-20.0, 75.0, 951)
-    method = methods.make("spectral", patch)
-    fit = fit_period(ridge_of(response_of(method, angles=angles)))
-    assert 1.0 < fit.period < 1.3
-    table = methods.make("spectral", patch, coherence="patch").table
-    found = window_fits(table, Beam(), WAVELENGTHS[::4], angles, count=8)
-    assert 1.0 < found.mean < 1.3
-    assert 0.02 < found.spread < 0.1
-    # published: 1144 nm, from one window on the corner
-    assert thesis_fit(table, Beam(), WAVELENGTHS, angles).period == pytest.approx(1.144, abs=0.003)
-
-
 def test_light_that_follows_no_grating_equation_is_passed_over():
     """A broad and brighter maximum near the mirror, as a bent scale has, beside the grating's."""
     line = (Beam().sine - np.sin(np.radians(ANGLES))) / (WAVELENGTHS[:, None] * 1e-3)

@@ -46,15 +46,6 @@ def test_its_commands_turn_what_the_scene_has(picture):
     assert {name for name, _ in args.parameters} | set(args.turn) <= set(known)
 
 
-def test_every_scene_is_shown():
-    shown = {picture.commands[-1][2] for picture in PICTURES}
-    # for the others to include, and one that needs no picture: docs/meshes.md works with it
-    parts = {"from_blender", "daylight", "lamp", "room", "skin", "skin_two", "studio", "window"}
-    parts |= {"environment", "outdoors", "label", "ring"}
-    scenes = {path.stem for path in (ROOT / "scenes").glob("*.xml")} - parts
-    assert shown == {f"scenes/{name}.xml" for name in scenes}
-
-
 @pictures
 def test_pictures_are_there_and_small(picture):
     file = DOCS / picture.file
@@ -94,12 +85,6 @@ def test_a_command_that_fails_is_named(stand_in, tmp_path):
     made = stand_in("mitsuba-diffraction render scenes/none.xml -o out/a.png")
     with pytest.raises(DiffractionError, match=r"'render scenes/none.xml .*' failed"):
         gallery.make(made, tmp_path / "a.jpg")
-
-
-def test_a_picture_without_commands_shows_the_scene_of_its_name():
-    (found,) = gallery.pictures("## A room\n\n![](images/gallery/room.jpg)\n\nA room.\n")
-    words = "mitsuba-diffraction render scenes/room.xml -o out/room.png"
-    assert found.commands == (tuple(words.split()),)
 
 
 def test_quality_gives_way_to_size(tmp_path):

@@ -70,10 +70,6 @@ def test_speed_has_all_measured_numbers_and_goals(tmp_path):
     assert "| `eval` / `roughconductor` (Al) | 2.0 | goal 0 |" in text
 
 
-def test_a_missed_goal_is_shown_as_missed():
-    assert "**missed:** goal 0" in tables.speed(bench(met=False))["speed"]
-
-
 def test_a_graphics_card_stands_beside_the_processor(tmp_path):
     document = bench()
     figures = document["sections"]

@@ -27,15 +27,6 @@ def test_links_lead_to_the_same_file_in_the_site(source, link, expected):
     assert rewritten(f"see [it]({link}).", source) == f"see [it]({expected})."
 
 
-def test_links_to_folders_become_text():
-    assert rewritten("[scenes](scenes) has examples", "README.md") == "scenes has examples"
-
-
-def test_code_is_left_alone():
-    text = "```sh\n[a](docs/b.md)\n```"
-    assert rewritten(text, "README.md") == text
-
-
 def test_linked_files_are_outside_of_the_documents_and_exist():
     files = list(linked_files(ROOT))
     assert Path("LICENSE") in files

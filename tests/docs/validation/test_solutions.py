@@ -9,24 +9,21 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from docs.make.validation import coated, coupled_wave, filmed, solutions, solve
+from docs.make.validation import coated, filmed, solve
 from docs.make.validation.agreement import on_cells, on_gratings
 from docs.make.validation.cases import (
-    FEW_WAVELENGTHS,
     MATERIALS,
     Case,
     Grating,
     Light,
     Media,
     grating_cases,
-    index_of,
 )
 from docs.make.validation.patches import CELLS
 from docs.make.validation.solutions import (
     CONVERGED,
     DATA,
     Orders,
-    Solutions,
     Solved,
     load,
     save,
@@ -63,13 +60,6 @@ def test_every_case_is_there_and_nearly_all_of_them_have_converged(material):
     assert len(every.trusted().column("order")) > 0.99 * len(change)
 
 
-def test_a_solution_with_one_order_that_has_not_converged_is_left_out_as_a_whole():
-    first, *others = shipped("keratin").solved
-    assert len(first.order) > 1
-    first.change[0, 1] = 2 * CONVERGED
-    assert Solutions([first, *others]).trusted().solved == others
-
-
 @pytest.mark.parametrize("material", MATERIALS)
 def test_energy_is_conserved(material):
     every = shipped(material).trusted()
@@ -89,19 +79,6 @@ def test_two_methods_agree():
     for part in on_cells():
         assert part.deviation < part.second_change, part.case
         assert part.first_change < 0.005, part.case
-
-
-def test_aluminium_is_mitsuba_s(some_variant):
-    import mitsuba as mi
-
-    for wavelength in FEW_WAVELENGTHS:
-        for name, value in (
-            ("eta", index_of("aluminium", wavelength).real),
-            ("k", index_of("aluminium", wavelength).imag),
-        ):
-            file = str(mi.file_resolver().resolve(f"data/ior/Al.{name}.spd"))
-            nodes, values = np.loadtxt(file).T
-            assert np.interp(wavelength, nodes, values) == pytest.approx(value, abs=6e-4)  # rounded
 
 
 FILM = "oxide on aluminium"
@@ -144,32 +121,6 @@ def test_a_solver_gives_what_is_stored_again(file, solver, case, resolutions, to
     assert again.powers == pytest.approx(stored.powers, abs=tolerance)
     if solver.startswith("patches"):
         assert again.jones == pytest.approx(stored.jones, abs=tolerance)
-
-
-@needs("pySCATMECH")
-def test_coupled_waves_give_the_stored_solutions_again():
-    case = Case(Grating("blazed", 1.1, 0.4), Light(610.0, -30.0), KERATIN)
-    again = coupled_wave.solve(case, coupled_wave.resolutions(case)[0])
-    stored = kept("keratin_coupled_wave", case)
-    # the resolution from which the stored change is counted; that was stored in half floats
-    change = np.abs(again.powers - stored.powers)
-    assert change == pytest.approx(stored.change, rel=2e-3, abs=1e-7)
-
-
-@gratinglab
-def test_what_has_not_converged_is_solved_again_on_a_finer_mesh(monkeypatch):
-    # short walls in grazing light, and a strict limit, so that coarse meshes do for the test
-    monkeypatch.setattr(solutions, "CONVERGED", 1e-3)
-    case = Case(Grating("lamellar", 2.5, 0.05), Light(410.0, 75.0), PERFECT)
-    twice = solve_case(case, (100, 200))
-    assert not twice.converged
-    thrice, expected = solve_case(case, (100, 200, 300)), solve_case(case, (200, 300))
-    for name in ("powers", "change"):
-        assert np.array_equal(getattr(thrice, name), getattr(expected, name))
-    # what has converged is left as it is
-    easy = Case(Grating("sinusoidal", 2.5, 0.05), Light(610.0, 0.0), PERFECT)
-    long, short = (solve_case(easy, levels) for levels in ((60, 80, 5), (60, 80)))
-    assert np.array_equal(long.powers, short.powers)
 
 
 @gratinglab

@@ -114,14 +114,6 @@ def test_the_exported_shader_has_the_same_colours(
         np.testing.assert_allclose(passed, beneath, atol=2e-3)  # half floats, linear cells
 
 
-def test_sheets_are_refused_in_one_line(some_variant: str) -> None:
-    sheet = load(thin_grating(period=0.5, reflectance=0.3, thin=True))
-    with pytest.raises(
-        DiffractionError, match="light that goes through, which an exported shader cannot"
-    ):
-        make_shader(sheet)
-
-
 def test_methods_of_the_thesis_refuse_solved_orders(table: OrderTable, some_variant: str) -> None:
     surface = packed_by(load(table).describe())
     with pytest.raises(DiffractionError, match=r"solved orders.*use method fast"):
