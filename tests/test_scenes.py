@@ -174,18 +174,6 @@ def test_it_renders_small(
 
 @pytest.mark.usefixtures("variant")
 @pytest.mark.thorough
-def test_the_snake_fills_half_of_the_picture() -> None:
-    import mitsuba as mi
-
-    scene = mi.load_file(str(SCENES / "snake.xml"), **SMALL)
-    depth = mi.load_dict({"type": "aov", "aovs": "shape:shape_index"})
-    index = np.array(mi.render(scene, integrator=depth, spp=4))[..., 0]
-    ground = [shape.id() for shape in scene.shapes()].index("ground")
-    assert (np.abs(index - ground) > 0.5).mean() > 0.5
-
-
-@pytest.mark.usefixtures("variant")
-@pytest.mark.thorough
 def test_colours_move_with_the_lamp() -> None:
     """Turning the lamp by some degrees moves another part of the spectrum over the plate."""
     more = {"spp": "32", "lamp_radius": "3"}

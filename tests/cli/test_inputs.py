@@ -6,10 +6,9 @@ import os
 import signal
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.support.systems import linux, posix
+from tests.support.systems import posix
 
 SCENE = """<scene version="3.0.0">
   <default name="width" value="8"/>
@@ -100,16 +99,6 @@ def test_a_pipe_for_a_frame_or_a_table_of_treatments_is_refused_at_once(run, her
     assert "pipe or a device" in ran.failed_in_one_line()
 
 
-@linux
-@pytest.mark.parametrize(
-    "command", ["info {}", "precompute {}", "render {}", "tonemap {} -o a.png"]
-)
-@pytest.mark.parametrize("file", ["/proc/self/environ", "/proc/kmsg"])
-def test_files_of_the_system_without_a_size_are_refused_at_once(run, here, alarm, command, file):
-    line = run(*command.format(file).split()).failed_in_one_line()
-    assert "without a size" in line or "cannot read" in line or "is empty" in line
-
-
 def test_a_long_value_in_a_scene_is_not_taken_for_a_file(run, here):
     Path("a.xml").write_text(SCENE.format('<string name="note" value="' + 300 * "a" + '"/>'))
     ran = run("render", "a.xml", "-m", "scalar_rgb", "-s", 1)
@@ -142,25 +131,3 @@ def test_a_misspelt_parameter_of_a_scene_is_one_line(run, here, command):
     assert "'int_iorr'; did you mean int_ior?" in line
     assert "Traceback" not in line
     assert "instantiate" not in line
-
-
-@pytest.mark.parametrize("digits", [30, 5000])
-@pytest.mark.parametrize(
-    "command",
-    ["precompute {}", "info {}", "solve {}", "survey a.npy --treatments {}", "plan a.xml",
-     "brdf-map a.npy --pixel-size 0.1 --coherence-width 2 --tolerance 0.1 --layers {}"],
-)  # fmt: skip
-def test_a_whole_number_of_many_digits_in_toml_is_refused_in_one_line(run, here, command, digits):
-    Path("a.toml").write_text(f"pixel_size = {digits * '9'}\n")
-    np.save("a.npy", np.zeros((20, 20)))
-    Path("a.xml").write_text(
-        SCENE.format(
-            '<shape type="sphere"><bsdf type="diffraction">'
-            '<string name="filename" value="a.toml"/></bsdf></shape>'
-        )
-    )
-    ran = run(*command.format("a.toml").split())
-    assert ran.code == 1
-    *notes, line = ran.err.splitlines()
-    assert all("note" in note or ", after " in note for note in notes)
-    assert "a.toml' is not TOML" in line

@@ -31,16 +31,3 @@ def test_linked_files_are_outside_of_the_documents_and_exist():
     files = list(linked_files(ROOT))
     assert Path("LICENSE") in files
     assert all((ROOT / path).is_file() and path.parts[0] != "docs" for path in files)
-
-
-def test_formulas_become_mathml_with_their_numbers():
-    formulas = pytest.importorskip("docs.make.site.formulas", exc_type=ImportError)
-    page = (
-        r'<p><span class="arithmatex">\(\kappa &lt; 1\)</span></p>'
-        r'<div class="arithmatex">\[ f = \frac{1}{w^2} \tag{3} \]</div>'
-    )
-    html = formulas.typeset(page)
-    assert html.count("<math") == 2
-    assert "(3)" in html
-    assert "arithmatex" not in html
-    assert "tag" not in html

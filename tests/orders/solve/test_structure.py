@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -176,31 +175,6 @@ def test_two_solvers_agree_on_films_on_a_slope():
     chandezon = Chandezon(surface.profile, 8, surface.structure).amplitudes(station)
     # phases too: steps in place of the slope miss 0.014 and 0.007, as 1/steps
     assert np.abs(2 * fine - coarse - chandezon).max() < 2e-3
-
-
-@pytest.mark.parametrize(
-    ("solver", "profile"),
-    [
-        (CoupledWaves, lamellar(0.5, 0.1)), (Chandezon, sinusoidal(0.6, 0.1)),
-        (Chandezon, blazed(0.6, 0.1)),
-    ],
-    ids=["walls", "sine", "blaze"],
-)  # fmt: skip
-def test_films_move_a_profile(solver, profile):
-    """Light sees only a film that it does not pass, and no film of the medium above."""
-    bare, thick = filmed(profile, []), filmed(profile, [("Al", 0.3)], material="1.5")
-    air = filmed(profile, [(str(SUPERSTRATE), 0.07)])
-
-    def amplitudes(surface):
-        light = surface.station(1, 0, 0.35, 0.5, [0.5])
-        light = light if surface is thick else replace(station, media=light.media)
-        return solver(profile, 12, surface.structure).amplitudes(light)
-
-    station = bare.station(1, 0, 0.35, 0.5, [0.5])
-    expected = amplitudes(bare)
-    # e⁻⁴⁵ of the light reaches the glass; a moved profile gives these phases
-    assert np.abs(np.abs(amplitudes(thick)) - np.abs(expected)).max() < 1e-6
-    assert np.abs(amplitudes(air) - expected).max() < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -81,18 +81,6 @@ def test_a_ball_and_a_plate_are_as_far_away_as_they_are(some_variant: str) -> No
     assert np.abs(found - expected)[near].max() < 0.5 * 3**0.5 + 0.25
 
 
-def test_no_ray_slips_through_a_large_triangle(some_variant: str) -> None:
-    """Every cell along a line across it is at most a cell from an occupied one."""
-    packed = pack_obstacles(np.array([[[0.0, 0, 0], [1, 0, 0.3], [0.2, 1, 0.7]]]))
-    low, cell, size = (packed.uniforms[f"obstacles_{n}"] for n in ("low", "cell", "size"))
-    texels = packed.textures[0].data.ravel()[: np.prod(size)].reshape(size[::-1])
-    weights = np.random.default_rng(0).dirichlet(np.ones(3), 20000)
-    inside = weights @ [[0.0, 0, 0], [1, 0, 0.3], [0.2, 1, 0.7]]
-    x, y, z = ((inside - low) / cell).astype(int).T
-    assert (texels[z, y, x] == 0).mean() > 0.9
-    assert texels[z, y, x].max() <= 4 * 3**0.5
-
-
 def test_relief_ends_where_a_table_does(some_variant: str) -> None:
     """Beyond it powers would be those at its end, and scales of energy extrapolated."""
     field = gratings.sinusoidal(1.6, 0.05, periods=2)

@@ -69,15 +69,6 @@ def test_nmm_with_the_width_of_lobes_is_the_whole_spectrum(grating, pairs_of_a_s
     assert np.abs(found - exact).sum() < 0.01 * exact.sum()
 
 
-def test_nmm_of_the_thesis_is_too_blue(grating, pairs_of_a_sweep):
-    wi, wo = pairs_of_a_sweep
-    of = methods.make_all(("flss", "nmm"), grating, coherence_width=60.0)
-    away = ~of["nmm"].white_pairs(np.broadcast_to(wi, wo.shape), wo)
-    shares = [m.xyz(wi, wo[away]).sum(axis=0) for m in of.values()]
-    blue = [xyz[2] / xyz[0] for xyz in shares]
-    assert blue[1] > 1.2 * blue[0]
-
-
 def test_nmm_is_white_around_the_mirror_direction(grating):
     method = methods.make("nmm", grating, coherence_width=60.0)
     xyz = method.xyz(polar(30.0), [polar(-30.0), polar(-30.2)])
@@ -137,22 +128,6 @@ def test_pq_is_the_fourier_transform_of_a_rectangle_of_patches(rough, of_rough):
     # a sinc cut off after 4 bins to either side leaves about 1/(4π) of its neighbours' amplitudes
     assert np.abs(found - expected).sum() < 0.05 * expected.sum()
     assert np.abs(found - expected).sum() < np.abs(linear - expected).sum()
-
-
-def test_pq_agrees_at_the_orders_with_either_interpolation(grating):
-    of = methods.make_all(("pq", "pq-sinc"), grating, repeats=(4, 2))
-    wi = polar(0.0)
-    orders = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    wo = np.array([polar(np.degrees(np.arcsin(m * 0.6 / 2.0))) for m in orders])
-    values = [of[name].relative(wi, wo, 600.0) for name in ("pq", "pq-sinc")]
-    np.testing.assert_allclose(values[0], values[1], rtol=1e-6)
-    # J_m²(κ·depth/2), sinusoidal grating
-    from scipy.special import jv
-
-    gain = Gain().factor(np.broadcast_to(wi, wo.shape), wo)
-    kappa = 2 * np.pi / 0.6 * (1.0 + wo[:, 2])
-    # the table's tolerance
-    np.testing.assert_allclose(values[1] / gain, jv(orders, kappa * 0.06) ** 2, atol=1e-4)
 
 
 def test_the_rainbow_s_colour_is_the_integral_of_its_spectrum(grating):
