@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.inputs import COMMANDS, SLOW
 from tests.support.systems import posix
 
 SCENE = """<scene version="3.0.0">
@@ -42,28 +43,25 @@ def alarm():
     signal.signal(signal.SIGALRM, before)
 
 
-_LOOK = "h.npy --pixel-size 0.1 --light 0"
+#: Lines with files that heights are read from, however they are named, and a list of orders.
+_MORE = [
+    *(f"info {name}" for name in ("h", *(f"h.{suffix}" for suffix in _SUFFIXES))),
+    *(f"{command} its.toml" for command in _OF_HEIGHTS), "brdf-map h", "evaluate h.exr",
+    "solve h.csv --import --period 1", "hologram logo.png --mesh h.ply", "tangents h.gltf",
+]  # fmt: skip
 
 
 @posix
-@pytest.mark.parametrize(
-    "line",
-    [
-        "info pipe", *(f"info pipe.{suffix}" for suffix in _SUFFIXES),
-        *(f"{command} {file}" for command in _OF_HEIGHTS for file in ("pipe.npy", "its.toml")),
-        "precompute pipe.toml", "brdf-map pipe", "evaluate pipe.exr", "sweep method pipe",
-        "solve pipe.csv --import --period 1", "orders pipe.nc", "tonemap pipe.exr",
-        "hologram pipe.png", "hologram logo.png --mesh pipe.ply", "tangents -o a.ply pipe.ply",
-        "tangents -o a.ply pipe.gltf", "render -m scalar_rgb pipe.xml", "plan pipe.xml",
-        "compare pipe.xml", "view pipe.xml", "export-viewer pipe.xml -o a.html",
-        f"spectrum {_LOOK} --pigment pipe.csv", f"spectrum {_LOOK} --layers pipe.toml",
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("line", [*(command for command, _ in COMMANDS + SLOW), *_MORE])
 def test_a_pipe_is_refused_at_once(run, world, alarm, line):
-    Path("its.toml").write_text('source = "pipe.npy"\n')
-    for name in {"pipe.npy", *(word for word in line.split() if word.startswith("pipe"))}:
-        os.mkfifo(name)
-    *_, last = run(*line.split()).err.splitlines()
+    """The last of the files in the command's words is a pipe."""
+    files = [word for word in line.replace("=", " ").split() if Path(word).suffix or word == "h"]
+    name = "h.npy" if "its.toml" in line else [f for f in files if not f[0].isdigit()][-1]
+    Path("its.toml").write_text('source = "h.npy"\n')
+    Path(name).unlink(missing_ok=True)
+    os.mkfifo(name)
+    out = ["-o", "a.ply"] if line.startswith("tangents") else []
+    *_, last = run(*line.split(), *out).err.splitlines()
     assert "pipe or a device" in last
 
 
