@@ -25,7 +25,6 @@ from mitsuba_diffraction.analysis.observers import (
     relit,
     responses,
 )
-from mitsuba_diffraction.errors import DiffractionError
 
 LAM = np.arange(300.0, 701.0, 5.0)
 # ten smooth spectra, steps and bells among them
@@ -162,40 +161,12 @@ def test_ratios_and_weber_fractions_are_the_user_s():
         [0.1, 0.1, 0.05, 0.1]
     )
     assert noises(replace(eye, weber=(0.2, 0.3, 0.4, 0.5))).tolist() == [0.2, 0.3, 0.4, 0.5]
-    for wrong in ({"density": (1.0, 2.0)}, {"weber": (0.1, -1.0, 1.0, 1.0)}):
-        with pytest.raises(DiffractionError, match=r"expected .* numbers above 0"):
-            replace(eye, **wrong)
 
 
-@pytest.mark.parametrize(
-    ("content", "named"),
-    [
-        ("", "is empty"),
-        ("wl,a,b\n300,1\n", "a column for each receptor"),
-        ("wl,a,b\n500,1,1\n600,1,1\n", "400"),
-        ("wl,a,b\n300,1,-1\n700,1,1\n", "0 or more"),
-        ("wl,a\n300,1\n700,1\n", "two receptors"),
-        ("wl,a,b\n300,1,nan\n700,1,1\n", "line 2"),
-        ("wl,a,b\n300,1,0\n700,1,0\n", "receptor b is 0"),
-        ("wl,l,l\n300,1,1\n700,1,1\n", "'l' cannot name a receptor"),
-        ("wl,a,\n300,1,1\n700,1,1\n", "cannot name a receptor"),
-    ],
-)
-def test_files_that_are_no_eyes_are_one_line(tmp_path, content, named):
-    file = tmp_path / "eye.csv"
-    file.write_text(content)
-    with pytest.raises(DiffractionError, match=named):
-        eye_of(str(file))
-
-
-def test_eyes_are_names_or_files_and_see_what_spectra_cover(tmp_path):
+def test_an_eye_may_be_a_file(tmp_path):
     file = tmp_path / "eye.csv"
     file.write_text("wl,a,b\n300,1,0\n700,1,1\n")
     assert eye_of(str(file)).names == ("a", "b")
-    with pytest.raises(DiffractionError, match="avian_uv"):
-        eye_of("dragon")
-    with pytest.raises(DiffractionError, match="wavelength range must cover"):
-        quantum_catches(eye_of("avian_uv"), [400.0, 700.0], [[1.0], [1.0]])
 
 
 def test_lights_have_quanta_of_mean_1_and_the_sky_is_bluer_than_the_sun(tmp_path):
@@ -216,17 +187,6 @@ def test_shade_under_leaves_is_green_and_has_little_ultraviolet():
     assert shade[GRID < 400.0].sum() < 0.8 * daylight[GRID < 400.0].sum()
     assert relit("leaves") * daylight == pytest.approx(shade)
     assert relit("d65") == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize("content", ["wl,photons\n400,1\n700,1\n", "wl,photons\n300,0\n700,0\n"])
-def test_files_that_are_no_lights_are_one_line(tmp_path, content):
-    file = tmp_path / "light.csv"
-    file.write_text(content)
-    with pytest.raises(DiffractionError, match="is not a spectrum"):
-        illuminant_of(str(file))
-    assert illuminant_of("D65") == pytest.approx(illuminant_of("d65"))
-    with pytest.raises(DiffractionError, match="choose one of ideal, d55"):
-        illuminant_of("moon")
 
 
 def test_four_receptors_have_two_pictures_and_two_are_yellow_and_blue():

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.analysis.spectra import check_wavelengths, mean_spectra
+from mitsuba_diffraction.analysis.spectra import mean_spectra
 from mitsuba_diffraction.analysis.spectra_files import (
     colour_of,
     save_csv,
@@ -104,36 +104,12 @@ def test_geometries_are_measurable_or_refused(light, detectors, azimuth, accepta
     assert max(map(abs, geometry.detectors)) + 0.5 * geometry.acceptance <= STEEPEST
 
 
-@pytest.mark.parametrize("wrong", [[], [[500.0]], [500.0, 400.0], [-5.0], [math.nan]])
-def test_wavelengths_that_are_none_are_refused(wrong):
-    with pytest.raises(md.DiffractionError):
-        check_wavelengths(wrong)
-
-
 def test_a_wide_cone_collects_a_mirror_s_narrow_lobe_wherever_it_lies():
     """A lobe of a standard deviation of 0.17°, 20° from the axis of a cone of 120°."""
     surface = load(FLAT, coherence_width=65.0, int_ior=1.5)
     light = md.spectrum(surface, 0.0, [20.0], acceptance=120.0, relative="none",
                         wavelengths=[420.0])  # fmt: skip
     assert light.value[0] == pytest.approx(0.04, rel=2e-3)
-
-
-def test_wavelengths_beyond_a_metal_s_table_are_refused():
-    metal = load(FLAT, coherence_width=10.0, material="Al")
-    with pytest.raises(md.DiffractionError, match=r"298\.8 to 885\.6"):
-        md.spectrum(metal, wavelengths=[800.0, 900.0])
-
-
-def test_what_a_table_does_not_hold_is_refused():
-    surface = load(FLAT, coherence_width=10.0)
-    with pytest.raises(md.DiffractionError, match="320 nm: the table has 360 to 830"):
-        md.spectrum(surface, wavelengths=[320.0, 400.0])
-    orders = load(md.OrderTable.mirror(0.6))
-    with pytest.raises(md.DiffractionError, match="900 nm: the table has 380 to 780"):
-        md.spectrum(orders, wavelengths=[600.0, 900.0])
-    assert (md.spectrum(orders).value > 0.0).all()
-    with pytest.raises(md.DiffractionError, match="relative"):
-        md.spectrum(surface, relative="grey")
 
 
 ANGLES, LIGHT, AZIMUTH, ACCEPTANCE = (0.0, 35.0), 20.0, 30.0, 5.0

@@ -131,12 +131,6 @@ def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
     assert treatment_for(Path("in/c.npy"), load_treatments(path)) == Treatment()
 
 
-@pytest.mark.parametrize("text", ["level = 1", '["*"]\nheight = 2', '["*"]\nlevel = "sea"', "["])
-def test_treatments_that_are_none_are_one_line(tmp_path, text):
-    with pytest.raises(DiffractionError, match=r"treatments\.toml"):
-        load_treatments(_toml(tmp_path, text))
-
-
 def test_scans_are_files_folders_and_patterns(tmp_path):
     for name in ("b_1.npy", "b_2.npy", "a.txt", "notes.md", ".hidden.npy"):
         (tmp_path / name).touch()

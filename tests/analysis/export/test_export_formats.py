@@ -12,7 +12,6 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis.export import rgl, scatter, zemax
 from mitsuba_diffraction.analysis.export.nodes import ExportGrid
 from mitsuba_diffraction.columns import read_columns
@@ -269,16 +268,6 @@ def test_mirrors_and_narrow_lobes_keep_their_light_in_a_file(tmp_path, name):
                 assert whole == pytest.approx(expected, rel=0.01)
 
 
-def test_windows_too_wide_to_integrate_and_several_wavelengths_for_zemax_are_refused(tmp_path):
-    wide = mi.load_dict(md.bsdf_dict(FLAT, coherence_width=500.0))
-    grid = ExportGrid(np.array([0.0]), np.array([0.0]), np.array([550.0]), 86)
-    with pytest.raises(DiffractionError, match="narrower"):
-        zemax.save_zemax(wide, tmp_path / "m.bsdf", grid)
-    with pytest.raises(DiffractionError, match="expected one"):
-        zemax.save_zemax(wide, tmp_path / "m.bsdf", scatter.DEFAULT)
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_csv_has_the_scatter_of_each_pair(tmp_path):
     """The same numbers as the JSON, with the columns that its first line names."""
     bsdf = mi.load_dict(grating(material="Al"))
@@ -328,25 +317,3 @@ def test_bird_s_json_has_f_of_each_pair(tmp_path):
         expected = f(bsdf, wi, wo, wavelength)
         # bands of 100 nm, over which lobes move by a third of their width, and cells of 6°
         assert np.corrcoef(columns["BRDF"][row], expected)[0, 1] > 0.98
-
-
-@pytest.mark.parametrize(
-    ("surface", "wavelength"), [(FLAT, 300.0), (OrderTable.mirror(0.6), 900.0)]
-)
-def test_light_that_a_table_lacks_is_refused(tmp_path, surface, wavelength):
-    grid = zemax.DEFAULT._replace(wavelengths=np.array([wavelength]))
-    with pytest.raises(DiffractionError, match=rf"wavelength {wavelength:g} nm: .* to \d+ nm"):
-        zemax.save_zemax(mi.load_dict(md.bsdf_dict(surface)), tmp_path / "x.bsdf", grid)
-    assert not list(tmp_path.iterdir())
-
-
-def test_surfaces_that_transmit_and_too_large_files_are_refused(tmp_path):
-    sheet = mi.load_dict(md.bsdf_dict(thin_grating(0.6, counts=(2, 2, 1), thin=True)))
-    with pytest.raises(DiffractionError, match="light that goes through"):
-        rgl.save_rgl(sheet, tmp_path / "x.bsdf")
-    mirror = mi.load_dict(md.bsdf_dict(OrderTable.mirror(0.6)))
-    with pytest.raises(DiffractionError, match="lower the resolution"):
-        rgl.save_rgl(mirror, tmp_path / "x.bsdf", rgl.DEFAULT._replace(resolution=1000))
-    with pytest.raises(DiffractionError, match="theta: expected rising"):
-        rgl.save_rgl(mirror, tmp_path / "x.bsdf", rgl.DEFAULT._replace(theta=np.array([95.0])))
-    assert not list(tmp_path.iterdir())
