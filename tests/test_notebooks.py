@@ -134,15 +134,6 @@ def test_a_cell_that_fails_is_named_and_the_file_stays(tmp_path, capsys):
     assert path.read_bytes() == before
 
 
-def test_what_is_no_notebook_is_one_clear_line(tmp_path, capsys):
-    for path in (tmp_path / "absent.ipynb", tmp_path / "text.ipynb"):
-        if path.stem == "text":
-            path.write_text("no JSON", encoding="utf-8")
-        assert main([str(path)]) == 1
-        (line,) = capsys.readouterr().err.strip().splitlines()
-        assert f"'{path}' is not a notebook that can be read" in line
-
-
 #: Run by `make notebooks` alone: half of all the notebooks' time, and their calls have tests.
 LONG = "shaders_against_path_tracing", "solved_orders", "speed_and_accuracy"
 

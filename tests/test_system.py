@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction import system
 from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
@@ -90,12 +89,3 @@ def test_missing_library_of_the_system_is_one_line(tmp_path):
     (line,) = ran.stderr.splitlines()
     assert "libatomic.so.1: cannot open" in line
     assert "apt install libatomic1" in line
-
-
-def test_a_process_lives_until_it_has_ended():
-    assert system.process_lives(os.getpid())
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
-        assert system.process_lives(child.pid)
-        child.communicate(b"\n")
-    assert not system.process_lives(child.pid)
-    assert not system.process_lives(10**30)

@@ -97,21 +97,6 @@ def test_rows_have_periods_to_a_percent_and_a_second_run_measures_only_what_is_n
     assert measured == [str(scans[2])]
 
 
-def test_heights_that_an_option_scales_say_so_and_a_flat_scan_is_last(scans, tmp_path):
-    np.save(tmp_path / "flat.npy", np.zeros((40, 40)))
-    own = Treatment(settings=SMALL)
-    options = load_treatments(
-        _toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n["s*.npy"]\nmax_height = 0.1\n')
-    )
-    rows = run_survey([tmp_path / "flat.npy", scans[0]], tmp_path / "two", treatments=options,
-                      common=own, resolution=32)  # fmt: skip
-    flat, grating = rows
-    assert "overrides" not in flat["warnings"]
-    assert flat["ranked_among"] == "scans below 10 µm"
-    assert "straight.npy': max_height overrides" in grating["warnings"]
-    assert ranked(rows) == [grating, flat]
-
-
 def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path):
     own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
     options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))

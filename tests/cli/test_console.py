@@ -12,7 +12,6 @@ import sys
 import termios
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from mitsuba_diffraction.cli import interrupt
@@ -90,20 +89,6 @@ def test_a_signal_ends_what_holds_the_main_thread(tmp_path, number, code):
     assert process.returncode == code
     assert said.count("\n") == (1 if number == signal.SIGINT else 0), said
     assert os.listdir(tmp_path) == []
-
-
-def test_a_survey_says_where_it_goes_on_whatever_holds_the_main_thread(tmp_path):
-    np.save(tmp_path / "scan.npy", np.eye(16))
-    held = HELD.replace("Source.of = read", "import mitsuba_diffraction.analysis.survey as survey")
-    held += "survey.measure = read"
-    process = started(held, tmp_path, "survey", "scan.npy", "--pixel-size", "0.1")
-    assert process.stdout is not None
-    process.stdout.readline()
-    for _ in range(2):
-        process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=SOON)
-    assert process.returncode == 130
-    assert "finished scans are in 'survey': run the command again to go on" in said
 
 
 def test_a_second_ctrl_c_does_not_cut_the_last_line_short(run, monkeypatch):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shlex
 import webbrowser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -169,9 +168,3 @@ def test_a_label_lies_on_the_front_of_a_mesh(run, logo):
     run("hologram", logo, "--mesh", "board.obj", "--up", "z", "-o", "a/b").succeeded()
     assert 'type="fitted_mesh"' in Path("a/b/label.xml").read_text()
     assert Path("a/b/board.obj").read_bytes() == Path("board.obj").read_bytes()
-
-
-def test_the_command_that_renders_a_hologram_can_be_typed(run, logo):
-    ran = run("hologram", logo, "--dots", "64", "-o", "my card").succeeded()
-    words = shlex.split(ran.out.splitlines()[-1].partition("mitsuba-diffraction ")[2])
-    assert words == ["render", str(Path("my card", "label.xml")), "--denoise"]

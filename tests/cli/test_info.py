@@ -138,20 +138,6 @@ def test_a_patch_too_wide_for_its_window_is_mentioned(run, tmp_path):
     assert any("so much more than the coherence window" in line for line in data["warnings"])
 
 
-def test_periods_are_described(run, tmp_path):
-    x = np.arange(200) * 0.1
-    np.save(tmp_path / "a.npy", np.tile(0.05 * np.cos(2 * np.pi * x / 2.5), (180, 1)))
-    ran = run("info", tmp_path / "a.npy", "--pixel-size", "0.1")
-    assert "2.5 µm along 0°, 100% of the variance" in ran.out
-
-
-def test_a_patch_of_nanometres_is_not_advised_a_window_of_nanometres(run, tmp_path):
-    np.save(tmp_path / "a.npy", np.random.default_rng(1).normal(0, 1e-5, (50, 50)))
-    ran = run("info", tmp_path / "a.npy", "--pixel-size", "0.006")
-    assert "--coherence-width" not in ran.out
-    assert "check its pixel size" in ran.out
-
-
 def test_a_question_about_units_is_asked_once(run, here):
     np.save("nm.npy", np.tile(100.0 * np.sin(np.arange(64)), (64, 1)))
     ran = run("info", "nm.npy", "--pixel-size", 0.05)

@@ -42,33 +42,6 @@ def test_numbers_of_arrays_are_plain():
     assert plain({"a": np.float32(0.5), "b": (np.int64(2), math.inf)}) == {"a": 0.5, "b": [2, None]}
 
 
-def test_units_and_nesting_read_well():
-    content = {
-        "kind": "table",
-        "wavelength_range_nm": [360.0, 830.0],
-        "error": {"near": 1.2345678e-4, "met": True},
-        "extent": [65.0, 32.5],
-        "history": ["levelled", "clipped"],
-        "patches": [{"range": 0.25, "history": []}],
-        "options": {},
-    }
-    assert list(lines_of(content)) == [
-        "kind:             table",
-        "wavelength range: 360 to 830 nm",
-        "error:",
-        "  near: 0.0001235",
-        "  met:  yes",
-        "extent:           65 x 32.5 µm",
-        "history:",
-        "  - levelled",
-        "  - clipped",
-        "patches:",
-        "  - range:   0.25 µm",
-        "    history: none",
-        "options:          none",
-    ]
-
-
 @pytest.mark.parametrize("progress", [None, False])
 def test_a_line_says_how_far_the_work_is(monkeypatch, capfd, progress):
     monkeypatch.setattr(console, "EVERY", 0.05)

@@ -50,25 +50,6 @@ def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected, t
     client.cluster.scale(2)
 
 
-def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path, monkeypatch):
-    keep = tmp_path / "passes"
-
-    def interrupt(done, total, text):
-        if done >= 4:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    with pytest.raises(DiffractionError, match="interrupted"):
-        rendered(client, scene, keep=keep, progress=interrupt)
-    there = len(list(keep.iterdir()))
-    assert 4 <= there < 12
-    monkeypatch.setattr(groups, "GROUPS", 4)  # single passes are continued with in fours
-    again = film(client, scene, keep)
-    np.testing.assert_array_equal(picture_of(again), expected)
-    assert again.report.kept == there
-    assert again.report.tasks == 12 - there
-    assert not keep.exists()
-
-
 def test_a_full_disk_is_one_line_and_leaves_nothing(client, scene, expected, tmp_path):
     resource = pytest.importorskip("resource")  # of Unix
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -83,33 +64,36 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(client, scene, expected, tmp
     np.testing.assert_array_equal(again, expected)
 
 
-KILLED = """
+STOPPED = """
 import os, signal
 from mitsuba_diffraction import cluster
 from mitsuba_diffraction.scene import passes
 
 passes.SAMPLES["llvm"] = 2 * 24 * 16
 
-def kill(done, *_):
+def stop(done, *_):
     if done >= 4:
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), signal.{name})
 
 with cluster.connect(scheduler={address!r}) as client:
     cluster.render(
         "room.xml", client=client, spp=24, seed=3, variant={variant!r}, threads=1, keep="passes",
-        progress=kill,
+        progress=stop,
     )
 """
 
 
-def test_a_client_that_was_killed_goes_on(client, scene, expected):
-    code = KILLED.format(address=client.scheduler.address, variant=VARIANT)
-    assert python(code).returncode == -signal.SIGKILL
+@pytest.mark.parametrize("name", ["SIGKILL", "SIGINT"])
+def test_a_client_that_was_stopped_goes_on(client, scene, expected, monkeypatch, name):
+    ran = python(STOPPED.format(address=client.scheduler.address, variant=VARIANT, name=name))
+    assert ran.returncode == -signal.SIGKILL if name == "SIGKILL" else "interrupted" in ran.stderr
     there = len(list(Path("passes").glob("*.sum")))
-    assert 4 <= there
+    assert 4 <= there <= 12
+    monkeypatch.setattr(groups, "GROUPS", 4)  # single passes are continued with in fours
     again = film(client, scene, Path("passes"))
     np.testing.assert_array_equal(picture_of(again), expected)
-    assert again.report.tasks == 12 - there
+    assert (again.report.kept, again.report.tasks) == (there, 12 - there)
+    assert not Path("passes").exists()
 
 
 CLUSTER = """

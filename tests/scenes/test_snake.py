@@ -14,68 +14,19 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.orientation import load_mesh, texture_tangents
+from mitsuba_diffraction.scene.orientation import load_mesh
 from scenes.make.__main__ import elaphe, main, xenopeltis
 from scenes.make.anatomy import Anatomy
-from scenes.make.scales import Scales
-from scenes.make.snake import Snake, build
+from scenes.make.snake import Snake
 from scenes.make.spine import coil
 from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
 
 
-@pytest.fixture(scope="module", params=["keeled", "smooth", "hose"])
-def snake(request: pytest.FixtureRequest) -> Snake:
-    """Coarse snakes of different make."""
-    if request.param == "keeled":
-        return build(scales=Scales(detail=2), head_detail=24)
-    if request.param == "smooth":
-        return build(scales=Scales(rows=15, keel=0, detail=3, fan=20.0), head_detail=30, coils=1)
-    return build(Anatomy(taper=0.0, length=90), Scales(rows=9, detail=1), head_detail=20, coils=1)
-
-
 @pytest.fixture(scope="module", params=[elaphe, xenopeltis])
 def committed(request: pytest.FixtureRequest) -> tuple[str, Snake]:
     return request.param.__name__, request.param()
-
-
-def _visible(snake: Snake) -> np.ndarray:
-    """Faces that look the way their vertex normals do: all but the undercut edges of scales."""
-    corners = snake.body.positions[snake.body.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outward = snake.body.normals[snake.body.faces].sum(axis=1)
-    return (normal * outward).sum(axis=1) > 0
-
-
-def test_the_first_tangent_runs_along_the_body(snake: Snake) -> None:
-    body, faces = snake.body, snake.body.faces[_visible(snake)]
-    u = body.uv[faces, 0].mean(axis=1)
-    # the nose and the tail tip are poles, where the skin runs across the spine
-    middle = (u > 0.5) & (u < snake.skin.u_max - 0.3)
-    faces, u = faces[middle], u[middle]
-    sides = body.positions[faces[:, 1:]] - body.positions[faces[:, :1]]
-    dp_du, dp_dv, texture = texture_tangents(sides, body.uv[faces[:, 1:]] - body.uv[faces[:, :1]])
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    # slivers that close the gaps between three scales have no texture area
-    good = np.abs(texture) > 1e-4 * area
-    assert area[good].sum() > 0.999 * area.sum()
-    dp_du, dp_dv, area, u = dp_du[good], dp_dv[good], area[good], u[good]
-
-    def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        cosine = (a * b).sum(axis=1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)
-        return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-
-    off = angle(dp_du, snake.skin.tangent(u))
-    order = np.argsort(off)
-    share = np.cumsum(area[order]) / area.sum()
-    # scales are tilted by some 4° and bent; head and neck widen by up to 20°
-    assert off[order][np.searchsorted(share, 0.5)] < 8
-    assert off[order][np.searchsorted(share, 0.95)] < 22
-    # v runs around, and u and v measure alike: 1.3 leaves room for the flat belly and the head
-    assert np.median(np.abs(angle(dp_du, dp_dv) - 90)) < 5
-    ratio = np.median(np.linalg.norm(dp_du, axis=1) / np.linalg.norm(dp_dv, axis=1))
-    assert 1 / 1.3 < ratio < 1.3
 
 
 def test_the_committed_bodies_are_closed(committed: tuple[str, Snake]) -> None:

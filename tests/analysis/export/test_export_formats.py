@@ -295,25 +295,3 @@ def test_each_wavelength_has_a_band_of_its_own(tmp_path, solved):
         values.append(rows[rows[:, 4] == 700.0, 5])
     assert values[0].max() > 0.0
     np.testing.assert_allclose(values[0], values[1], rtol=1e-4, atol=1e-5 * values[0].max())
-
-
-def test_bird_s_json_has_f_of_each_pair(tmp_path):
-    bsdf, file = mi.load_dict(grating(material="Al")), tmp_path / "grating.brdf"
-    grid = ExportGrid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([500.0, 600]), 16)
-    scatter.save_bird(bsdf, file, grid, "Al grating")
-    content = json.loads(file.read_text("utf-8"))
-    meta, data = content["metadata"], content["data"]
-    assert (meta["type"], meta["method"], meta["sample"]["name"]) == (
-        "BRDF", "simulation", "Al grating",
-    )  # fmt: skip
-    columns = {name: np.array(each["values"]) for name, each in data.items()}
-    assert {len(column) for column in columns.values()} == {2 * 2 * 2 * 16 * 64}
-    assert data["BRDF"]["unit"] == "sr^-1"
-    assert columns["theta_r"].max() < 90
-    assert columns["phi_r"].max() < 360
-    for wavelength in (500.0, 600.0):
-        row = columns["wavelength_i"] == wavelength
-        wi, wo = (polar(columns[f"theta_{end}"][row], columns[f"phi_{end}"][row]) for end in "ir")
-        expected = f(bsdf, wi, wo, wavelength)
-        # bands of 100 nm, over which lobes move by a third of their width, and cells of 6°
-        assert np.corrcoef(columns["BRDF"][row], expected)[0, 1] > 0.98

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 from importlib.util import find_spec
 
@@ -23,10 +22,8 @@ from docs.make.validation.patches import CELLS
 from docs.make.validation.solutions import (
     CONVERGED,
     DATA,
-    Orders,
     Solved,
     load,
-    save,
     shipped,
 )
 from docs.make.validation.solve import main, solve_case
@@ -145,28 +142,6 @@ def test_a_solver_that_is_missing_is_named(monkeypatch, tmp_path, capsys):
     assert "'.[validation]'" in error
     assert error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
-
-
-def test_what_was_saved_is_loaded(tmp_path):
-    order = np.array([[0, 0], [1, -1]])
-    powers = np.array([[0.5, np.nan], [0.25, 0.125]])
-    cases = [
-        Case(surface, Light(550.0, 30.0, 45.0), KERATIN)
-        for surface in (Grating("blazed", 1.1, 0.05), CELLS["crossed grating"])
-    ]
-    coarse, fine = Orders(order[:1], powers[:1]), Orders(order, powers, jones=np.ones((2, 2, 2)))
-    made = [Solved.between(case, coarse, fine) for case in cases]
-    path = tmp_path / "x.npz"
-    save(made, {"solver": "none"}, path)
-    loaded = load(path, KERATIN)
-    assert loaded.about == {"solver": "none"}
-    for (case, solved), name in itertools.product(
-        zip(cases, loaded.solved, strict=True), ("order", "powers", "jones")
-    ):
-        assert solved.case == case
-        assert np.array_equal(getattr(solved, name), getattr(fine, name), equal_nan=True)
-        # an order that the coarse resolution lacks is new
-        assert np.array_equal(solved.change, [[0, np.nan], powers[1]], equal_nan=True)
 
 
 @pytest.mark.parametrize("content", [b"", b"not a zip"])

@@ -7,26 +7,17 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.orders import cells
 from mitsuba_diffraction.orders.solve.crossed import CrossedWaves
-from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
-from mitsuba_diffraction.orders.solve.profiles import Profile, UnitCell
+from mitsuba_diffraction.orders.solve.profiles import UnitCell
 from mitsuba_diffraction.orders.solve.settings import Settings
-from mitsuba_diffraction.orders.solve.stations import CrossedStation, Grating
+from mitsuba_diffraction.orders.solve.stations import CrossedStation
 from mitsuba_diffraction.reference.fresnel import amplitudes
 from tests.orders.kinds import light
 
 PERIOD, LAM, LIMITS, PIXELS = 0.6, 550.0, (500.0, 700.0), 24
-GLASS = material_of(1.5, LIMITS)
 Y, X = np.mgrid[:PIXELS, :PIXELS] / PIXELS
 #: Without mirror planes, so that every sign shows.
 LUMPS = 0.03 * (np.cos(2 * np.pi * X) + np.sin(2 * np.pi * (X + Y)) + np.sin(4 * np.pi * Y))
-
-
-def steps(t):
-    """Two steps to one side: blazed, so that signs of orders and angles show."""
-    return np.where(t < 1 / 3, 0.2, np.where(t < 2 / 3, 0.1, 0.0))
 
 
 def reflected(heights, periods, theta, phi, harmonics):
@@ -39,35 +30,6 @@ def reflected(heights, periods, theta, phi, harmonics):
     solved = CrossedWaves(UnitCell(heights, periods), harmonics).amplitudes(station)[0]
     powers = (np.abs(solved[orders.index((0, 0))]) ** 2).sum(axis=-1).mean(axis=0)
     return dict(zip(orders, powers.tolist(), strict=True))
-
-
-def of_grooves(theta, phi):
-    """Unpolarised efficiencies of `steps` by the boundary integral method, by order."""
-    x, z = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6]), np.repeat([0.2, 0.1, 0.0], 2)
-    grating = Grating(Profile(x, z, PERIOD), GLASS, 1.0, LIMITS)
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
-    cell = cells.to_cell(-sine * np.cos(turn), sine * np.sin(turn), LAM, PERIOD)
-    w = float(cells.w_of(cell.k_continuous, LAM, LIMITS, PERIOD))
-    place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), (w,)
-    solver = IntegralSolver(grating.profile, 60)
-    j = int(cell.channel)
-    powers = np.abs(solver.amplitudes(grating.station(*place))[0, j]) ** 2
-    return {j - q: float(power) for q, power in enumerate(powers.sum(axis=-1).mean(axis=0))}
-
-
-@pytest.mark.parametrize("phi", [0.0, 20.0])
-@pytest.mark.parametrize("along", ["x", "y"])
-def test_grooves_have_the_light_of_the_integral_method(along, phi):
-    pytest.importorskip("gratinglab")
-    # a short second period keeps the harmonics along it few
-    short, rows = 0.06, slice(None, None, PIXELS // 2)
-    if along == "x":
-        found = reflected(steps(X)[rows], (PERIOD, short), 30.0, phi, 8)
-    else:
-        found = reflected(steps(Y)[:, rows], (short, PERIOD), 30.0, phi + 90.0, 8)
-    for order, truth in of_grooves(30.0, phi).items():
-        pair = (order, 0) if along == "x" else (0, order)
-        assert found[pair] == pytest.approx(truth, rel=0.01)  # 0.5 % with 17 harmonics
 
 
 def test_a_table_of_a_flat_cell_has_fresnel_s_light_of_s_and_p_in_all_directions():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -18,15 +16,11 @@ from mitsuba_diffraction.scene.planning.light import (
     light_of_tables,
 )
 from mitsuba_diffraction.scene.planning.plan import (
-    frequency_limit,
     load_by_recipes,
-    outside,
     plan_table,
-    quantiles,
     recipe_files,
     recipe_of,
 )
-from mitsuba_diffraction.tables import TableRequest
 from tests.support.directions import polar, rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -85,12 +79,6 @@ def file(tmp_path_factory):
 def variant():
     """Other modules set others."""
     mi.set_variant("llvm_ad_spectral")
-
-
-def light_by_hand(lit, frequency):
-    """Light of the plate's table at these frequencies, which is all there is."""
-    total = float(frequency.sum())
-    return dataclasses.replace(lit, frequency=frequency, total=total)
 
 
 def from_file(file, **parameters):
@@ -191,33 +179,6 @@ def test_several_surfaces_have_light_of_their_own():
     for each in (first, second):
         assert each.share == pytest.approx(1.0, abs=1e-3)
     assert first.total > 2.0 * second.total
-
-
-def test_the_limit_is_a_quantile_of_the_light(lit):
-    frequency = np.zeros((BINS, BINS))
-    frequency[0] = 1.0 / BINS
-    light, end = light_by_hand(lit, frequency), lit.table.q_limit
-    along_x, along_y = frequency_limit(light, 0.1)
-    # 2 % of room are added
-    assert along_x == pytest.approx(1.02 * 0.90 * end, abs=2.0 * end / BINS)
-    # all of it lies on one axis
-    assert along_y <= along_x / 7
-    assert outside(light, (along_x, along_y)) <= 0.1
-    assert frequency_limit(light, 1e-4)[0] == end
-    assert quantiles(np.arange(1000), np.ones(1000), [0.5]) == pytest.approx([500], abs=2)
-
-
-def test_where_all_of_a_table_is_asked_for_it_stays_whole(lit):
-    class Unused(TableRequest):
-        def cached(self, settings):
-            raise AssertionError("a table is built")
-
-    asked = lit.request
-    request = Unused(*(getattr(asked, each.name) for each in dataclasses.fields(asked)))
-    full = dataclasses.replace(light_by_hand(lit, np.ones((BINS, BINS))), request=request)
-    assert plan_table(full, 1e-3).settings is None
-    unseen = light_by_hand(full, np.zeros((BINS, BINS)))
-    assert plan_table(unseen, 1e-3).table is lit.table
 
 
 def test_a_recipe_builds_the_planned_table_again(file, tmp_path):
