@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis.maps import LightDirection, contact_sheet
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
@@ -112,22 +111,3 @@ def test_compiled_flss_and_default_are_timed_side_by_side(grating, some_variant)
     assert found.spectral > 0.0
     assert found.ratio == found.flss / found.spectral
     assert found.colour_ratio == found.flss / found.colours
-
-
-@pytest.mark.parametrize(
-    ("kind", "arguments", "text"),
-    [
-        ("weather", {}, "sweep 'weather' is unknown"),
-        ("method", {"values": ["flss", "ray"]}, "method='ray' is unknown"),
-        ("method", {"values": []}, "0 values are to be swept"),
-        ("wavelength-step", {"values": [0.0]}, "step=0 nm does not fit"),
-        ("coherence-width", {"values": [-5.0]}, "coherence_width=-5"),
-        ("terms", {"values": [2.5]}, "terms=2.5 must be a whole number"),
-        ("terms", {"method": "pq"}, "a sweep over terms needs method 'flss'"),
-        ("light-angle", {"values": [120.0]}, "theta=120 must be"),
-        ("method", {"values": ["rainbow"], "gain": Gain()}, "no relative reflectance"),
-    ],
-)
-def test_what_does_not_fit_is_refused(grating, kind, arguments, text):
-    with pytest.raises(DiffractionError, match=text):
-        sweep(kind, grating, LightDirection(20.0), **(SETTINGS | arguments))
