@@ -1,9 +1,12 @@
-"""Earlier spellings of options: the current one stands in their place, and it is said once."""
+"""Options tell their defaults; earlier spellings become the current ones, which is said once."""
 
 from __future__ import annotations
 
+import argparse
+
 import pytest
 
+from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.cli.spellings import current
 
 #: A command line, and the current word in it; none where the line is current.
@@ -38,3 +41,16 @@ def test_an_earlier_spelling_is_the_current_one_and_is_said(line, capsys):
         assert "=".join(words).split("=") == line.replace("=", " ").split()
     files = {word for word in line.split() if word.endswith((".npy", ".obj", ".exr", ".ply"))}
     assert files <= {*words}
+
+
+def test_each_option_tells_its_default_once():
+    parsers = next(a.choices for a in build_parser()._actions if isinstance(a.choices, dict))
+    without = None, False, True, argparse.SUPPRESS
+    told = {
+        f"{name} {action.dest}": str(action.help).count("default:")
+        for name, parser in parsers.items()
+        for action in parser._actions
+        if action.option_strings and not any(action.default is each for each in without)
+        and action.default != []
+    }  # fmt: skip
+    assert {option for option, count in told.items() if count != 1} == set()
