@@ -137,6 +137,7 @@ REFUSED = {
         "scale.png --pixel-size 0.1": "--max-height 0.375",
         "scale.png --max-height 0.1": "--pixel-size",
         "wrong.toml": "'wrong.toml': tolerance=2",
+        "long.toml": "is not TOML: the number",
         "none.npy": "'none.npy'",
         "empty.npy": "'empty.npy'",
         "cut.npy": "'cut.npy'",
@@ -404,6 +405,7 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "measured.csv": "wl,R\n800,0.1\n900,0.2\n",
         "wrong.toml": 'generator = "sinusoidal"\noutput = "a.exr"\ntolerance = 2\n'
         "[arguments]\nperiod = 1.0\ndepth = 0.1\n",
+        "long.toml": f"pixel_size = {30 * '9'}\n",
         "digits.toml": f"repeat = {5000 * '9'}\n",
         "groove.toml": 'method = "solved"\nprofile = "sinusoidal"\nmaterial = "none"\n'
         'output = "groove.nc"\n[arguments]\nperiod = 0.5\ndepth = 0.05\n',
