@@ -7,7 +7,10 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.orders import OrderTable, cells
+from mitsuba_diffraction.orders.cells import Counts
+from mitsuba_diffraction.orders.rows import Kind, rows, wavelength_of
 from mitsuba_diffraction.orders.table import MARGIN
+from mitsuba_diffraction.reference.fresnel import reflectance
 from tests.orders.kinds import KINDS, light, orders_of, sides_of
 from tests.support.orders import thin_grating
 
@@ -57,6 +60,31 @@ def test_orders_that_propagate_share_the_light_and_go_back_as_they_came(kind):
     for share in total.values():
         assert share.max() <= 1.0 + 1e-9
     assert kind in ("listed", *APART) or table.reciprocity < 1e-5  # single precision
+
+
+def test_even_grids_follow_the_polynomials():
+    counts = Counts(16, 8, 4)
+    grid = rows(GRATING, Kind(4, cells.B, 4), counts).within
+    assert grid.shape == (17, 9, 5, 4, 4)
+    big_k = 4 + cells.sine_squared(0.5)
+    wavelength = wavelength_of(GRATING, big_k, 0.75)
+    at = cells.from_cell(4, cells.B, 2, 0.25, 0.5, wavelength, GRATING.optical_period)
+    expected = GRATING.efficiency(at.x, at.y, wavelength, 2 - np.arange(4))
+    assert grid[4, 4, 3, 2] == pytest.approx(expected, abs=2e-3)  # curvature over cells
+
+
+def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
+    mirror = OrderTable.mirror(1.6, 0.8, superstrate=1.5)
+    grid = rows(mirror, Kind(6, cells.A, 7), Counts(4, 4, 4))
+    big_k = 6 + cells.sine_squared(0.5)
+    at = cells.from_cell(
+        6, cells.A, 3, 0.5, 0.5, wavelength_of(mirror, big_k, 0.75), mirror.optical_period
+    )
+    face = reflectance(np.sqrt(1.0 - 1.5**2 * (at.x**2 + at.y**2)), 1.5)
+    # geometric series of R ρ; tables hold what is between both passages of the face
+    expected, passage = 0.8 / (1.0 - 0.8 * face), np.sqrt(1.0 - 0.8 * face)
+    assert grid.within[2, 2, 3, 3, 3] == pytest.approx(expected * passage**2, rel=1e-3)
+    assert grid.through[2, 2, 3, 3, 3] == pytest.approx(expected * (1.0 - face) * passage, rel=1e-3)
 
 
 @pytest.mark.parametrize("kind", KINDS)
