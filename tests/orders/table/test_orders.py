@@ -70,7 +70,7 @@ def test_even_grids_follow_the_polynomials():
     wavelength = wavelength_of(GRATING, big_k, 0.75)
     at = cells.from_cell(4, cells.B, 2, 0.25, 0.5, wavelength, GRATING.optical_period)
     expected = GRATING.efficiency(at.x, at.y, wavelength, 2 - np.arange(4))
-    assert grid[4, 4, 3, 2] == pytest.approx(expected, abs=2e-3)  # curvature over cells
+    assert grid[4, 4, 3, 2] == pytest.approx(expected, abs=3e-4)  # curvature over cells
 
 
 def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
