@@ -63,14 +63,13 @@ def test_orders_that_propagate_share_the_light_and_go_back_as_they_came(kind):
 
 
 def test_even_grids_follow_the_polynomials():
-    counts = Counts(16, 8, 4)
-    grid = rows(GRATING, Kind(4, cells.B, 4), counts).within
-    assert grid.shape == (17, 9, 5, 4, 4)
-    big_k = 4 + cells.sine_squared(0.5)
-    wavelength = wavelength_of(GRATING, big_k, 0.75)
-    at = cells.from_cell(4, cells.B, 2, 0.25, 0.5, wavelength, GRATING.optical_period)
-    expected = GRATING.efficiency(at.x, at.y, wavelength, 2 - np.arange(4))
-    assert grid[4, 4, 3, 2] == pytest.approx(expected, abs=3e-4)  # curvature over cells
+    """Where w matters most."""
+    grid = rows(GRATING, Kind(4, cells.A, 5), Counts(16, 8, 4)).within
+    assert grid.shape == (17, 9, 5, 5, 5)
+    wavelength = wavelength_of(GRATING, 4 + cells.sine_squared(2 / 8), 3 / 4)
+    at = cells.from_cell(4, cells.A, 0, 3 / 16, 2 / 8, wavelength, GRATING.optical_period)
+    expected = GRATING.efficiency(at.x, at.y, wavelength, -np.arange(5))
+    assert grid[3, 2, 3, 0] == pytest.approx(expected, abs=3e-4)  # curvature over cells
 
 
 def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
