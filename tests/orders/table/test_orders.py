@@ -62,16 +62,6 @@ def test_orders_that_propagate_share_the_light_and_go_back_as_they_came(kind):
     assert kind in ("listed", *APART) or table.reciprocity < 1e-5  # single precision
 
 
-def test_even_grids_follow_the_polynomials():
-    grid = rows(GRATING, Kind(4, cells.A, 5), Counts(16, 8, 4)).within
-    assert grid.shape == (17, 9, 5, 5, 5)
-    w = np.linspace(0.0, 1.0, 5)[:, None]
-    wavelength = wavelength_of(GRATING, 4 + cells.sine_squared(2 / 8), w)
-    at = cells.from_cell(4, cells.A, 0, 3 / 16, 2 / 8, wavelength, GRATING.optical_period)
-    expected = GRATING.efficiency(at.x, at.y, wavelength, -np.arange(5))
-    assert grid[3, 2, :, 0] == pytest.approx(expected, abs=3e-4)  # curvature over cells
-
-
 def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
     mirror = OrderTable.mirror(1.6, 0.8, superstrate=1.5)
     grid = rows(mirror, Kind(6, cells.A, 7), Counts(4, 4, 4))

@@ -199,12 +199,6 @@ def test_orders_of_one_window_interfere_as_in_the_plugin(gl: Any) -> None:
     assert difference(shaded(gl, make_shader(bsdf, ["fast"]), wi, wo), expected) < 0.003
 
 
-def test_a_coherent_sum_is_refused_by_exact(patch: HeightField) -> None:
-    table = DiffractionTable.build(patch, coherence_width=6.5, coherence="patch")
-    with pytest.raises(DiffractionError, match=r"coherence='patch'.*use method fast"):
-        pack_powers(table)
-
-
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("all_parts", [False, True])
 def test_one_body_compiles_on_the_desktop_and_in_a_browser(
@@ -246,8 +240,3 @@ def test_the_logs_of_other_compilers_are_understood(log: str) -> None:
     parts = [("a.glsl", 10 * "\n"), ("b.glsl", 10 * "\n")]
     words = compiler_words(f"GLSL Compiler failed\n\nfragment_shader\n{log}\n", parts)
     assert words.startswith("b.glsl, line 5: ")
-
-
-def test_an_unknown_method_is_refused_with_the_choices() -> None:
-    with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of fast, exact"):
-        fragment_parts("phong", {})

@@ -8,9 +8,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, bsdf_dict, gratings
+from mitsuba_diffraction import DiffractionTable, bsdf_dict, gratings
 from mitsuba_diffraction.realtime.glsl.packed_scene import PackedScene
-from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of
+from mitsuba_diffraction.realtime.glsl.scene import triangles_of
 from mitsuba_diffraction.realtime.glsl.shadows import Solid, outline
 from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
 
@@ -90,18 +90,3 @@ def test_relief_ends_where_a_table_does(some_variant: str) -> None:
         surface = bsdf_dict(table, energy_conserving=False)
         scene = {"type": "scene", "disk": {"type": "disk", "bsdf": surface}, "sensor": sensor}
         assert PackedScene(mi.load_dict(scene), 0, (-1.0, 0.0, 0.5)).octaves == octaves
-
-
-def test_attributes_that_are_missing_and_places_are_refused(some_variant: str) -> None:
-    props = mi.Properties()
-    turn = {"type": "mesh_attribute", "name": "vertex_orientation"}
-    props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": turn})
-    placed = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}
-    disk = {"type": "disk", "bsdf": bsdf_dict(gratings.sinusoidal(1.6, 0.05, periods=2), **placed)}
-    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
-    for shape, words in (
-        (mi.Mesh("plate", 3, 1, props=props), "no attribute vertex_orientation"),
-        (disk, "coherence='surface'"),
-    ):
-        with pytest.raises(DiffractionError, match=words):
-            read_scene(mi.load_dict({"type": "scene", "shape": shape, "sensor": sensor}))

@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 import mitsuba_diffraction.thesis.shaders  # registers its methods
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.lobes import pack_lobes
-from mitsuba_diffraction.realtime.glsl.methods import method_tables
 from mitsuba_diffraction.realtime.glsl.packing import pack_responses
-from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.solved import order_power, pack_orders
 from tests.realtime.glsl.shaders import DAYLIGHT, difference, paired, probed, shaded
 from tests.support.orders import load, thin_grating
@@ -112,9 +109,3 @@ def test_the_exported_shader_has_the_same_colours(
         beneath = (1.0 - reflected[0]) * (1.0 - reflected[1])
         passed = shaded(gl, shader, wi, wo, "diffraction_transmission")
         np.testing.assert_allclose(passed, beneath, atol=2e-3)  # half floats, linear cells
-
-
-def test_methods_of_the_thesis_refuse_solved_orders(table: OrderTable, some_variant: str) -> None:
-    surface = packed_by(load(table).describe())
-    with pytest.raises(DiffractionError, match=r"solved orders.*use method fast"):
-        method_tables("flss", surface)
