@@ -14,12 +14,14 @@ import mitsuba_diffraction as md
 import mitsuba_diffraction.thesis.shaders  # registers its methods
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
 from mitsuba_diffraction.realtime.glsl.emitters import Emitters
+from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.methods import method_tables
 from mitsuba_diffraction.realtime.glsl.packing import pack_powers
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
 from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.source import fragment_parts
+from mitsuba_diffraction.realtime.web.export import make_page
 from tests.support.orders import load, thin_grating
 from tests.support.refusals import refused
 
@@ -54,6 +56,10 @@ def sky() -> dict[str, Any]:
     picture = np.ones((8, 16, 3), np.float32)
     picture[2, 3] = np.inf
     return {"type": "envmap", "bitmap": mi.Bitmap(picture)}
+
+
+def shader(methods: list[str], **given: Any) -> object:
+    return make_shader(mi.load_dict(skinned("disk", **given)["bsdf"]), methods)
 
 
 def driver(version: int, most: int) -> None:
@@ -91,6 +97,12 @@ REFUSED: list[tuple[Callable[[Any], object], str]] = [
      "coherence='patch'.*use method fast"),
     (lambda _: method_tables("flss", packed_by(load(thin_grating(0.5)).describe())),
      "solved orders.*use method fast"),
+    *((lambda _, methods=methods: shader(methods, int_ior=1.5), "choose from fast, exact")
+      for methods in (["flss"], [], ["fast"] * 2)),
+    (lambda _: make_page(scene_of(), methods=["flss"]), "choose from fast, exact"),
+    (lambda _: shader(["fast"], int_ior=1.5, film_ior=1.8, film_thickness=90),
+     "an exported shader cannot show"),
+    (lambda _: make_shader(mi.load_dict({"type": "diffuse"}), ["fast"]), "does not diffract"),
     # drivers
     (lambda _: driver(310, 16384), r"Ancient has OpenGL 3\.1, .*need 3\.3"),
     (lambda _: driver(330, 1024), "Ancient supports textures of 1024 .* need 4096"),
