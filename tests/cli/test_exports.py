@@ -77,13 +77,6 @@ def test_a_material_for_blender_is_written_with_all_that_it_reads(run, orders):
     assert json.loads(Path("report.json").read_text(encoding="utf-8"))["error"]["mean"] == 0.0
 
 
-def test_a_bad_name_is_refused_before_anything_is_made(run, orders):
-    for name in ("a b", "while", "mix"):
-        line = run("export-osl", orders, "-o", "out", "--name", name).failed_in_one_line()
-        assert "--name " in line
-    assert not Path("out").exists()
-
-
 def test_an_addon_holds_the_folders_that_are_named(run, orders):
     assert run("export-osl", orders, "-o", "grating-osl").code == 0
     ran = run("export-osl", "--addon", "looks.zip", "--with", "grating-osl").succeeded()
@@ -106,15 +99,6 @@ def test_a_page_is_written_with_its_title_as_text_and_its_loss_is_named(run, pla
     assert "plate.html: " in ran.out
     assert "fast ΔE2000" in ran.out
     assert "exact" not in ran.out
-
-
-@pytest.mark.parametrize("name", ["missing.exr", "empty.exr"])
-def test_an_environment_without_a_picture_is_refused_in_one_line(run, plate, name):
-    Path("empty.exr").touch()
-    sky = f'<emitter type="envmap"><string name="filename" value="{name}"/></emitter></scene>'
-    plate.write_text(plate.read_text().replace("</scene>", sky))
-    assert name in run("export-viewer", plate, "-o", "plate.html").failed_in_one_line()
-    assert not Path("plate.html").exists()
 
 
 @pytest.fixture

@@ -31,6 +31,9 @@ _EVALUATE = (
     "evaluate grating.npy --pixel-size 0.08 --coherence-width 12 --step 40 --angle-step 0.5 "
     "--positions 2 --periodic exact"
 )
+_SKY = room.PLATE.format(bsdf=room.SKIN).replace(
+    "</scene>", '<emitter type="envmap"><string name="filename" value="{}"/></emitter></scene>'
+)
 
 #: Beginnings of files, called `NAME.exr`.
 DAMAGED = {"empty": b"", "exr": b"\x76\x2f\x31\x01", "png": b"\x89PNG\r\n\x1a\n", "ab": b"ab"}
@@ -193,6 +196,9 @@ REFUSED = {
         "orders.nc -o orders.nc": "it is a file",
         "orders.nc -o orders.nc/in": "cannot write",
         "--addon a.zip --with empty": "export-osl",
+        **dict.fromkeys(
+            [f"orders.nc -o out --name {n}" for n in ("'a b'", "while", "mix")], "--name "
+        ),
     },
     "export-shader": {
         "missing.toml": "missing.toml",
@@ -205,6 +211,8 @@ REFUSED = {
         "plate.xml -o a.html -m scalar_rgb": "set llvm_ad_rgb or llvm_ad_spectral",
         "plate.xml -o a.html -m llvm_ad_mono": "set llvm_ad_rgb or llvm_ad_spectral",
         "dull.xml -o a.html": "diffracts",
+        "sky.xml -o a.html": "empty.exr",
+        "skyless.xml -o a.html": "missing.exr",
     },
     "compare": {
         "plate.xml -o compared -m scalar_rgb": "set llvm_ad_rgb or llvm_ad_spectral",
@@ -397,6 +405,8 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     texts = {
         "room.xml": room.SCENE,
         "dull.xml": room.SCENE,
+        "sky.xml": _SKY.format("empty.exr"),
+        "skyless.xml": _SKY.format("missing.exr"),
         "line.obj": "v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n",
         **{f"words.{suffix}": "words" for suffix in ("exr", "npy", "ply", "stl")},
         "empty.ply": "",
