@@ -75,6 +75,7 @@ REFUSED = {
         "--measured none.csv": "'none.csv' does not exist",
         "--measured measured.csv": "and the spectrum 400 to 700 nm; give others by",
         "--observer dragon": "dragon",
+        "--observer dog --cone-ratios 1,2,3": "expected 2 numbers",
     },
     # heights with notes, which would be in vain
     f"spectrum noise.npy {_SMALL}": {"--coat-ior 0.5": "--coat-ior 0.5 must be"},
