@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.maps import LightDirection, contact_sheet
+from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain
@@ -91,17 +91,6 @@ def test_relative_maps_are_the_thesis_value(grating):
     wo = np.array([x, y, (1 - x * x - y * y) ** 0.5])
     expected = method.relative(light.direction, wo, 500.0)[0]
     assert found.luminance[row, column] == pytest.approx(expected, rel=1e-6)
-
-
-def test_a_contact_sheet_has_a_map_for_every_value(grating):
-    result = sweep("light-angle", grating, LightDirection(), values=[0, 10, 20, 30, 40], **SETTINGS)
-    figure = contact_sheet(
-        [s.map for s in result.steps], [s.label for s in result.steps], title="light"
-    )
-    assert [axes.get_title().split(";")[0] for axes in figure.axes] == [
-        "0°", "10°", "20°", "30°", "40°",
-    ]  # fmt: skip
-    assert figure.axes[0].get_xlim() == (-1.02, 1.02)
 
 
 def test_compiled_flss_and_default_are_timed_side_by_side(grating, some_variant):
