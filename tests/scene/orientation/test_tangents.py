@@ -18,6 +18,7 @@ from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
 from tests.support import ROOT
 from tests.support.meshes import ball, obj_of, ring, tube
+from tests.support.refusals import refused
 
 PLY = b"""ply
 format binary_little_endian 1.0
@@ -116,9 +117,7 @@ def test_any_bytes_after_a_ply_header_are_read_or_refused(
 ) -> None:
     path = tmp_path_factory.mktemp("ply") / "mesh.ply"
     path.write_bytes(b"ply\nformat binary_little_endian 1.0\n" + content)
-    with pytest.raises(DiffractionError) as caught:
-        load_mesh(path)
-    assert "\n" not in str(caught.value)
+    refused(lambda: load_mesh(path), "")
 
 
 def test_a_written_mesh_reads_back_without_vertices_of_no_triangle(tmp_path: Path) -> None:
