@@ -112,6 +112,10 @@ def test_a_wide_cone_collects_a_mirror_s_narrow_lobe_wherever_it_lies():
     assert light.value[0] == pytest.approx(0.04, rel=2e-3)
 
 
+def test_default_wavelengths_are_within_the_table():
+    assert (md.spectrum(load(md.OrderTable.mirror(0.6))).value > 0.0).all()
+
+
 ANGLES, LIGHT, AZIMUTH, ACCEPTANCE = (0.0, 35.0), 20.0, 30.0, 5.0
 
 

@@ -174,6 +174,7 @@ REFUSED = {
         "lamellar --depth 0.1": "period",
         "lamellar --period 1": "depth",
         "missing.csv --period 1": "missing.csv",
+        "long.toml": "is not TOML: the number",
         "heap --period 1": "expected one of",
         "lamellar --period 1 --depth 0.1 --layer silicn:0.1": "layer 1: material='silicn'",
     },

@@ -25,8 +25,6 @@ from mitsuba_diffraction.realtime.web.export import make_page
 from tests.support.orders import load, thin_grating
 from tests.support.refusals import refused
 
-pytestmark = pytest.mark.thorough
-
 GRATING = md.gratings.sinusoidal(1.6, 0.05, periods=2)
 TURN = {"type": "mesh_attribute", "name": "vertex_orientation"}
 PLACED = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}
