@@ -199,7 +199,14 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("ask", "words"), REFUSED, ids=[words for _, words in REFUSED])
+#: Words of the rows that take seconds.
+SLOW = {"narrower": pytest.mark.thorough}
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [pytest.param(ask, words, id=words, marks=SLOW.get(words, ())) for ask, words in REFUSED],
+)
 def test_what_does_not_fit_is_refused(spectral, tmp_path, monkeypatch, ask, words):
     monkeypatch.chdir(tmp_path)
     refused(ask, words)
