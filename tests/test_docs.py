@@ -150,24 +150,6 @@ def slug(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
-def test_no_code_block_escapes():
-    for page in PAGES:
-        found = FENCE.findall(PAGES[page])
-        # drawings; commands and configurations of Dask; R, which need not be installed
-        drawn = {
-            "ARCHITECTURE.md": {""},
-            "docs/cluster.md": {"toml"},
-            "docs/from-scan.md": {"r"},
-            "docs/orders.md": {"toml"},
-            "docs/survey.md": {"toml"},
-        }.get(page, set())
-        known = {"sh", "python", "xml", "json", "text"} | drawn
-        assert {language for language, _ in found} <= known, page
-        assert PAGES[page].count("```") == 2 * len(found), page
-    # test_readme.py runs the first of each
-    assert [len(blocks("README.md", name)) for name in ("python", "xml")] == [1, 1]
-
-
 @pytest.mark.parametrize("page", ["ARCHITECTURE.md", "docs/extending.md"])
 def test_files_that_it_names_exist(page):
     files = set(re.findall(r"\w[\w/]*\.(?:py|md)\b", PAGES[page]))

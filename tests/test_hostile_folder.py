@@ -54,7 +54,7 @@ _OF_SCENES = {
     "plan": ["-o", "out/refused.toml"], "compare": ["-o", "out/refused"], "view": [],
     "export-viewer": ["-o", "out/refused.html"],
 }  # fmt: skip
-_SOME_SCENES = ["plugin.xml", "nested.xml", "recipe.xml"]
+_SOME_SCENES = ["plugin.xml", "above.xml", "table.xml"]
 #: Commands that are refused in one line; tests/cli/test_inputs.py names pipes to all of them.
 REFUSED = [
     *(["render", f"{scene}.xml", "-o", "out/refused.exr"] for scene in SCENES),

@@ -175,24 +175,6 @@ def test_tests_use_what_other_rooms_export():
     assert found == INNER
 
 
-def test_names_that_a_room_does_not_export_are_found():
-    source = """
-from mitsuba_diffraction import DiffractionTable, errors, reference as judge
-from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.optics.colour import delta_e, _cie
-from mitsuba_diffraction.tables.exr import load_table
-import mitsuba_diffraction.tables.document as document
-judge.brdf, judge.screens, DiffractionTable.build, judge.fresnel.amplitudes
-setattr("mitsuba_diffraction.heights.validity.LEVELS", ())
-program = "from mitsuba_diffraction.osl.export import OSL, export"
-"""
-    hidden = {name for _, name in names_of_the_package(source) if hidden_by(name)}
-    assert {name.partition(".")[2] for name in hidden} == {
-        "optics.colour._cie", "tables.exr.load_table", "tables.document", "reference.screens",
-        "heights.validity.LEVELS", "osl.export.OSL", "osl.export.export",
-    }  # fmt: skip
-
-
 def test_no_test_file_lies_where_pytest_does_not_look(pytestconfig):
     patterns = pytestconfig.getini("norecursedirs")
     for folder in {part for file in TESTS for part in file.relative_to(ROOT).parts[:-1]}:

@@ -25,7 +25,6 @@ from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.errors import (
     DiffractionError,
     DiffractionWarning,
-    counted,
     printable,
     warn,
 )
@@ -35,17 +34,6 @@ from tests.support import ROOT
 from tests.support.directions import rough_patch
 
 PACKAGE = Path(mitsuba_diffraction.__file__).parent
-
-
-def test_what_lies_between_two_quotations_is_not_cut():
-    prose = "in a sentence of many words that says what is wrong and where, " * 4
-    text = f"'a file.png' is {prose}so give crop='1' or 'none'"
-    assert str(DiffractionError(text)) == text
-
-
-def test_a_count_of_one_has_its_noun_in_the_singular():
-    assert counted(1, "scan") == "1 scan"
-    assert [counted(n, "spectrum", "spectra") for n in (0, 2)] == ["0 spectra", "2 spectra"]
 
 
 def test_a_long_quotation_is_cut_in_its_middle():
@@ -85,12 +73,6 @@ def test_a_warning_is_one_line_of_its_own_kind():
     assert caught[0].filename == __file__
 
 
-def test_the_package_warns_through_one_function():
-    for file in PACKAGE.rglob("*.py"):
-        if file.name != "errors.py":
-            assert "warnings.warn(" not in file.read_text("utf-8"), file
-
-
 @given(st.text())
 def test_no_text_controls_the_terminal(text):
     """Neither ESC, OSC and BEL nor bidirectional overrides; JSON keeps its meaning."""
@@ -101,11 +83,6 @@ def test_no_text_controls_the_terminal(text):
     assert json.loads(printable(json.dumps(text, ensure_ascii=False))) == text
     error = str(DiffractionError(text))
     assert error == printable(error)
-
-
-@pytest.mark.parametrize("text", ["µm, κ and ×", "a\nb\tc", "10\u202f000 µm", "鱗"])
-def test_readable_text_stays_as_it_is(text):
-    assert printable(text) == text
 
 
 def test_commands_that_messages_name_exist():
@@ -190,8 +167,3 @@ def test_missing_package_names_an_extra_that_has_it(
     named, extra = found.groups()
     assert any(re.match(rf"{package}\b", requirement) for requirement in EXTRAS[extra])
     assert f"'{package.lower()}" in named.lower()
-
-
-def test_installed_package_is_the_module():
-    pytest.importorskip("distributed")
-    assert optional("distributed") is sys.modules["distributed"]

@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
-import numpy as np
 import pytest
 
 from docs.make.figures.notebooks import execute, main
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.heights import gratings
 from tests.support import ROOT
-from tests.support.instruments import nanoscope
 from tests.support.variants import obstacle
 
 pytestmark = [
@@ -102,10 +99,6 @@ def smaller(path: Path, folder: Path) -> Path:
     return folder / path.name
 
 
-def test_there_are_notebooks():
-    assert {path.stem for path in NOTEBOOKS} >= set(SMALLER)
-
-
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_is_small_and_has_been_run(path):
     assert path.stat().st_size < 500_000
@@ -141,15 +134,6 @@ def test_a_cell_that_fails_is_named_and_the_file_stays(tmp_path, capsys):
     assert path.read_bytes() == before
 
 
-def test_what_is_no_notebook_is_one_clear_line(tmp_path, capsys):
-    for path in (tmp_path / "absent.ipynb", tmp_path / "text.ipynb"):
-        if path.stem == "text":
-            path.write_text("no JSON", encoding="utf-8")
-        assert main([str(path)]) == 1
-        (line,) = capsys.readouterr().err.strip().splitlines()
-        assert f"'{path}' is not a notebook that can be read" in line
-
-
 #: Run by `make notebooks` alone: half of all the notebooks' time, and their calls have tests.
 LONG = "shaders_against_path_tracing", "solved_orders", "speed_and_accuracy"
 
@@ -174,28 +158,3 @@ def test_it_runs_without_a_warning_and_keeps_its_promises(path, tmp_path):
     assert kinds(now) == kinds(before)
     # its cells hold their results against what the text says
     assert re.search(r"^\s*(assert |np\.testing\.assert_)", code(now), re.M)
-
-
-@pytest.mark.thorough
-def test_another_scan_takes_one_line(tmp_path):
-    """From a NanoScope file to a table, by the notebook that makes a scan of its own."""
-    pytest.importorskip("SurfaceTopography", reason="instrument files need the extra afm")
-    notebook = read(ROOT / "notebooks" / "from_scan_to_bsdf.ipynb")
-    if reason := hindrance(notebook):
-        pytest.skip(reason)
-    heights = gratings.elaphe_like(extent=6.0, pixels=96, depth=0.04).heights
-    counts = np.round((heights - 0.02) * 1e6).astype(np.int16)
-    (tmp_path / "scan.spm").write_bytes(nanoscope(counts, scan_size="6 6 ~m"))
-    # what comes after the table takes the table
-    end = next(
-        n for n, c in enumerate(notebook.cells) if "## What the treatment changed" in c.source
-    )
-    del notebook.cells[end:]
-    own = 'SCAN = folder / "practice.gwy"'
-    (cell,) = [cell for cell in notebook.cells if cell.source.startswith(own)]
-    cell.source = cell.source.replace(own, 'SCAN = "scan.spm"', 1)
-    nbformat.write(notebook, tmp_path / "own.ipynb")
-    now = execute(tmp_path / "own.ipynb")
-    assert streams(now, "stderr") == ""
-    assert "HeightField('scan.spm', 96 x 96 pixels of 0.0625 x 0.0625 µm" in streams(now, "stdout")
-    assert "from the true heights" not in streams(now, "stdout")

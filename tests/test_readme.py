@@ -59,7 +59,3 @@ def test_its_figures_are_on_the_page_that_measures_them(stated, page, measured):
     text = PAGES[f"docs/{page}.md"]
     found = [*text.splitlines(), *(" ".join(block.split()) for block in text.split("\n\n"))]
     assert any(all(words in line for words in measured) for line in found)
-
-
-def test_it_has_at_most_200_lines():
-    assert len(README.splitlines()) <= 200

@@ -170,29 +170,3 @@ def test_it_renders_small(
     assert image.shape == (10, 12, 3)
     assert np.isfinite(image).all()
     assert image.max() > 0.0
-
-
-@pytest.mark.usefixtures("variant")
-@pytest.mark.thorough
-def test_the_snake_fills_half_of_the_picture() -> None:
-    import mitsuba as mi
-
-    scene = mi.load_file(str(SCENES / "snake.xml"), **SMALL)
-    depth = mi.load_dict({"type": "aov", "aovs": "shape:shape_index"})
-    index = np.array(mi.render(scene, integrator=depth, spp=4))[..., 0]
-    ground = [shape.id() for shape in scene.shapes()].index("ground")
-    assert (np.abs(index - ground) > 0.5).mean() > 0.5
-
-
-@pytest.mark.usefixtures("variant")
-@pytest.mark.thorough
-def test_colours_move_with_the_lamp() -> None:
-    """Turning the lamp by some degrees moves another part of the spectrum over the plate."""
-    more = {"spp": "32", "lamp_radius": "3"}
-    middle = slice(14, 26), slice(14, 34)
-    blue, red = (
-        rendered("plate", lamp_azimuth=azimuth, **more)[middle].mean(axis=(0, 1))
-        for azimuth in ("54", "46")
-    )
-    # the orders lie across the plate, blue nearest to the mirror direction
-    assert blue[2] / blue[0] > 1.3 * red[2] / red[0]

@@ -7,10 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-import psutil
 import pytest
 
-from mitsuba_diffraction import system
 from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
@@ -91,29 +89,3 @@ def test_missing_library_of_the_system_is_one_line(tmp_path):
     (line,) = ran.stderr.splitlines()
     assert "libatomic.so.1: cannot open" in line
     assert "apt install libatomic1" in line
-
-
-def test_a_process_lives_until_it_has_ended():
-    assert system.process_lives(os.getpid())
-    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
-        assert system.process_lives(child.pid)
-        child.communicate(b"\n")
-    assert not system.process_lives(child.pid)
-    assert not system.process_lives(10**30)
-
-
-def test_peak_of_memory_is_at_least_what_is_held_now():
-    held = psutil.Process().memory_info().rss
-    assert held <= system.peak_memory() < psutil.virtual_memory().total
-
-
-def test_cores_are_those_of_the_process():
-    assert 1 <= system.cores() <= (os.cpu_count() or 1)
-
-
-def test_variables_of_the_environment_are_restored(monkeypatch):
-    monkeypatch.setenv("SET_BEFORE", "1")
-    with system.environment({"SET_BEFORE": "2", "NOT_SET_BEFORE": "3"}):
-        assert (os.environ["SET_BEFORE"], os.environ["NOT_SET_BEFORE"]) == ("2", "3")
-    assert os.environ["SET_BEFORE"] == "1"
-    assert "NOT_SET_BEFORE" not in os.environ

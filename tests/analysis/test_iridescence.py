@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from mitsuba_diffraction import DiffractionError, HeightField, bsdf_dict, gratings
+from mitsuba_diffraction import HeightField, bsdf_dict, gratings
 from mitsuba_diffraction.analysis.iridescence import (
     DiffractedLight,
     MaterialFactor,
@@ -89,11 +89,6 @@ def test_a_single_colour_is_not_iridescent_and_a_rainbow_is():
     pale = DiffractedLight(rainbow.xyz + 3 * rainbow.xyz.mean(axis=(0, 1)), 0.5)
     assert rainbow.iridescence() > 0.15
     assert pale.iridescence() < 0.5 * rainbow.iridescence()
-
-
-def test_a_table_of_few_wavelengths_is_refused():
-    with pytest.raises(DiffractionError, match="380"):
-        light_of(gratings.sinusoidal(1.6, 0.1, rows=2), wavelength_range=(500.0, 600.0))
 
 
 @pytest.mark.parametrize("surface", [{}, {"coat_ior": 1.33, "material": "keratin"}])

@@ -96,35 +96,11 @@ def test_rows_have_periods_to_a_percent_and_a_second_run_measures_only_what_is_n
     assert measured == [str(scans[2])]
 
 
-def test_heights_that_an_option_scales_say_so_and_a_flat_scan_is_last(scans, tmp_path):
-    np.save(tmp_path / "flat.npy", np.zeros((40, 40)))
-    text = f'["*.npy"]\npixel_size = {PIXEL}\n["s*.npy"]\nmax_height = 0.1\n'
-    treatment = load_treatments(_toml(tmp_path, text), Treatment(settings=SMALL))
-    files, folder = [tmp_path / "flat.npy", scans[0]], tmp_path / "two"
-    rows = run_survey(files, folder, treatment=treatment, resolution=32)
-    flat, grating = rows
-    assert "overrides" not in flat["warnings"]
-    assert flat["ranked_among"] == "scans below 10 µm"
-    assert "straight.npy': max_height overrides" in grating["warnings"]
-    assert ranked(rows) == [grating, flat]
-
-
 def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path):
     own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
     treatment = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'), own)
     (row,) = run_survey(scans[:1], tmp_path / "out", treatment=treatment, resolution=8)
     assert "starts at 500 nm" in row["reason"]
-
-
-def test_the_command_writes_the_folder(run, scans, tmp_path):
-    ran = run(
-        "survey", *scans[:2], tmp_path / "none.npy", "-o", tmp_path / "out", "--pixel-size", PIXEL,
-        "--coherence-width", 6, "--tolerance", 0.05, "--resolution", 24,
-    )  # fmt: skip
-    assert ran.code == 1
-    assert "1 scan in survey.csv, 2 failed, 3 samples" in ran.out
-    assert "none.npy" in ran.err
-    assert "uncertain by some 15 %" in ran.err
 
 
 def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
@@ -138,12 +114,6 @@ def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
     assert found.options.level == "lines"
     assert found.settings == {"tolerance": 0.1}
     assert treatment(Path("in/c.npy")) == Treatment()
-
-
-@pytest.mark.parametrize("text", ["level = 1", '["*"]\nheight = 2', '["*"]\nlevel = "sea"', "["])
-def test_treatments_that_are_none_are_one_line(tmp_path, text):
-    with pytest.raises(DiffractionError, match=r"treatments\.toml"):
-        load_treatments(_toml(tmp_path, text))
 
 
 def test_scans_are_files_folders_and_patterns(tmp_path):

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import mitsuba as mi
-import numpy as np
 import pytest
 
-import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError, DiffractionTable
-from mitsuba_diffraction.analysis import tradeoff
+from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.analysis.tradeoff.accuracy import (
     TERMS,
     Sample,
@@ -45,10 +41,6 @@ def test_the_error_found_is_below_the_tolerance_that_was_asked_for(sample, toler
     assert 0.0 < error <= tolerance
 
 
-def test_the_error_of_twice_the_power_is_one(sample):
-    assert sample.error(2.0 * sample.exact) == pytest.approx((1.0, 1.0), abs=1e-12)
-
-
 def result(tolerance: float, relative: float, megabytes: float) -> MeasuredSetting:
     setting = TradeoffSetting("tolerance", {"tolerance": tolerance})
     return MeasuredSetting(setting, error=tolerance, relative=relative, megabytes=megabytes)
@@ -71,37 +63,6 @@ RESULTS = [result(1e-2, 2.0, 4.0), result(1e-3, 3.0, 8.0), result(1e-5, 5.0, 30.
 )
 def test_the_recommended_setting_is_the_best_within_the_budget(budget, expected):
     assert recommended(RESULTS, budget).setting.name == expected
-
-
-def test_a_budget_that_nothing_meets_is_refused_in_one_line():
-    with pytest.raises(DiffractionError, match="no setting stays within this budget") as caught:
-        recommended(RESULTS, Budget(tolerance=1e-5, megabytes=10.0))
-    assert "\n" not in str(caught.value)
-
-
-def test_the_recommended_row_has_its_error_in_a_rendering(some_variant):
-    chosen = [TradeoffSetting("default"), TradeoffSetting("tolerance", {"tolerance": 1e-2})]
-    measured = tradeoff.measure(PATCH, chosen, coherence_width=WIDTH, lanes=64, rounds=1)
-    best = recommended(measured, Budget(tolerance=1e-2))
-
-    def picture(**arguments: float) -> np.ndarray:
-        """A plate in the light of a point: the light itself has no noise."""
-        bsdf = md.bsdf_dict(PATCH, coherence_width=WIDTH, material="none", **arguments)
-        to = mi.ScalarTransform4f().look_at([0, -1.5, 2], [0, 0, 0], [0, 1, 0])
-        film = {"type": "hdrfilm", "width": 24, "height": 24, "rfilter": {"type": "box"}}
-        scene = {
-            "type": "scene",
-            "integrator": {"type": "direct", "bsdf_samples": 0},
-            "plate": {"type": "rectangle", "bsdf": bsdf},
-            "light": {"type": "point", "position": [0.3, 1.2, 2.0]},
-            "sensor": {"type": "perspective", "fov": 50, "to_world": to, "film": film},
-        }
-        return np.array(mi.render(mi.load_dict(scene), spp=64, seed=3))
-
-    exact, found = picture(tolerance=1e-6), picture(**best.setting.arguments)
-    error = np.abs(found - exact).sum() / np.abs(exact).sum()
-    # stated of the worst κ, and of the region by order 0 or elsewhere that has more of it
-    assert 0.0 < error <= best.error
 
 
 def test_taylor_s_series_holds_for_shallow_surfaces_and_not_for_deep_ones():

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis.angular_variables import (
     DETECTORS,
     LAMPS,
-    angular_variables,
     fitted,
 )
 from mitsuba_diffraction.analysis.spectra import Spectra
@@ -44,13 +40,6 @@ def test_a_grating_s_colours_are_not_a_feather_s():
 
 def test_darkness_has_no_variables():
     assert fitted(INCIDENT, COLLECTED, 0.0 * INCIDENT, 0.0 * INCIDENT) == {}
-
-
-@pytest.mark.parametrize("wavelengths", [[550.0], [550.2, 550.4], [720.0, 800.0]])
-def test_wavelengths_without_a_peak_are_refused(wavelengths):
-    unused: Any = None
-    with pytest.raises(DiffractionError, match="two wavelengths"):
-        angular_variables(unused, wavelengths)
 
 
 LAM = np.arange(300.0, 701.0, 1.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -34,13 +33,6 @@ def test_an_exr_and_a_picture_are_written_and_named(run, heights, here):
     assert document["source"] == str(heights)
     with Image.open("grating-map.png") as image:
         assert image.size[0] > 400  # room for axes
-
-
-def test_a_png_comes_alone(run, heights, here):
-    assert run("brdf-map", heights, *QUICK, "-o", "a.png", "--json", "a.json").code == 0
-    report = json.loads(Path("a.json").read_text(encoding="utf-8"))
-    assert (report["files"], report["pixels"]) == (["a.png"], 32)
-    assert sorted(os.listdir(here)) == ["a.json", "a.png"]
 
 
 def test_options_reach_the_map(run, heights):

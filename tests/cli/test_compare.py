@@ -84,11 +84,6 @@ def check_progress(shares: list[tuple[float, str]], stages: int) -> None:
     assert shares[-1] == ((stages - 1) / stages, "timing fragments")
 
 
-def test_progress_covers_all_of_the_work_without_light_between_surfaces(run, scene, shares):
-    run("compare", scene, "--method", "all", "-s", 4, "--full-spp", 0, "--frames", 8).succeeded()
-    check_progress(shares, 6)  # direct light twice, `fast` of 8 and 4 frames, `exact`; times
-
-
 def test_pictures_a_sheet_and_numbers_are_written(run, scene, shares):
     ran = run("compare", scene, "--method", "all", "-s", 64, "--full-spp", 2, "--supersampling", 2,
               "--frames", 8).succeeded()  # fmt: skip

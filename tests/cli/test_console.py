@@ -12,10 +12,9 @@ import sys
 import termios
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from mitsuba_diffraction.cli import console, interrupt
+from mitsuba_diffraction.cli import interrupt
 from mitsuba_diffraction.heights.source import Source
 from tests.support import ROOT
 
@@ -92,20 +91,6 @@ def test_a_signal_ends_what_holds_the_main_thread(tmp_path, number, code):
     assert os.listdir(tmp_path) == []
 
 
-def test_a_survey_says_where_it_goes_on_whatever_holds_the_main_thread(tmp_path):
-    np.save(tmp_path / "scan.npy", np.eye(16))
-    held = HELD.replace("Source.of = read", "import mitsuba_diffraction.analysis.survey as survey")
-    held += "survey.measure = read"
-    process = started(held, tmp_path, "survey", "scan.npy", "--pixel-size", "0.1")
-    assert process.stdout is not None
-    process.stdout.readline()
-    for _ in range(2):
-        process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=SOON)
-    assert process.returncode == 130
-    assert "finished scans are in 'survey': run the command again to go on" in said
-
-
 def test_a_second_ctrl_c_does_not_cut_the_last_line_short(run, monkeypatch):
     said = interrupt.say
 
@@ -175,25 +160,3 @@ def test_what_a_plugin_raises_while_a_scene_loads_is_not_swallowed(
     assert ran.code == code
     assert text in ran.err
     assert len(ran.err.splitlines()) == bool(text)
-
-
-@pytest.mark.parametrize(
-    ("line", "shown"),
-    [
-        ("give fill=nearest, or crop", "give --fill nearest, or crop"),
-        ("without max_height: give pixel_size=0.05", "without --max-height: give pixel_size=0.05"),
-        ("level: expected plane", "--level: expected plane"),
-        ("'a.toml': fill=hope must be", "'a.toml': fill=hope must be"),
-        ("solve it with polarised=True (slow)", "solve it with --polarised (slow)"),
-        ("leave -D fill=1 out", "leave -D fill=1 out"),
-        ("layer 1: fill='x' is unknown", "layer 1: fill='x' is unknown"),
-        ("the preset snake,fill=2 is unknown", "the preset snake,fill=2 is unknown"),
-    ],
-)
-def test_messages_name_the_options_of_the_command(line, shown):
-    names = ("fill", "level", "polarised", "max_height")
-    console.name_flags({name: f"--{name.replace('_', '-')}" for name in names})
-    try:
-        assert console.flagged(line) == shown
-    finally:
-        console.name_flags({})

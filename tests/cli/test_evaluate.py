@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import mitsuba_diffraction as md
-from mitsuba_diffraction.optics.materials import TISSUES
 from mitsuba_diffraction.thesis.methods import NAMES
-from tests.support.directions import polar
 
 QUICK = [
     "--pixel-size", "0.08", "--coherence-width", "12", "--step", "40", "--angle-step", "0.5",
@@ -71,20 +68,6 @@ def test_few_periods_of_a_blazed_grating_are_within_their_error(
     assert abs(float(mean) - 1e3 * period) < 2.0 * float(spread)
 
 
-def test_a_surface_of_a_material_is_the_reference_s(run, heights):
-    run("evaluate", heights, *EXACT, *QUICK[:-1], "0", "--material", "keratin").succeeded()
-    patch = md.HeightField(np.load(heights), 0.08, periodic=True)
-    with np.load("grating-evaluation.npz") as saved:
-        lam, angles, found = saved["wavelengths"][4], saved["angles"][::20], saved["scatter"][4]
-    theta = np.radians(angles)
-    wo = np.stack([-np.sin(theta), 0.0 * theta, np.cos(theta)], axis=1)
-    eta = TISSUES["keratin"].index(lam).real
-    f = md.reference.brdf(patch, polar(75.0), wo, lam, eta=eta, coherence_width=12.0)
-    # the table's tolerance is of the largest value
-    expected = f * wo[:, 2]
-    assert found[::20] == pytest.approx(expected, rel=1e-2, abs=1e-3 * expected.max())
-
-
 @pytest.mark.parametrize("medium", ["1.05", "water"])
 def test_in_a_medium_the_period_is_the_surface_s_own(run, heights, medium):
     # periods are longer in units of the waves, and the window is not
@@ -134,19 +117,3 @@ def test_the_light_comes_across_the_grooves_and_steep_slopes_are_counted(run, tm
     with np.load("along.npz") as saved:
         assert np.isnan(saved["fitted_period"])
         assert np.isnan(saved["ridge"]).all()
-
-
-def test_a_given_period_is_compared_with(run, heights):
-    ran = run("evaluate", heights, *EXACT, *QUICK, "--period", "3", "-o", "a.png").succeeded()
-    assert "given     3000 nm, the ridge is within 0." in ran.out
-
-
-def test_order_2_is_not_sought_in_the_light_of_order_1(run, here):
-    """Order 1 sends many times as much light within the default angles."""
-    wave = np.tile(0.15 * np.sin(2.0 * np.pi * np.arange(75) * 0.08 / 3.0), (75, 1))
-    np.save(here / "grating.npy", wave)
-    ran = run("evaluate", "grating.npy", *EXACT, *QUICK, "--order", "2").succeeded()
-    with np.load("grating-evaluation.npz") as saved:
-        assert float(saved["fitted_period"]) == pytest.approx(3.0, rel=0.02)
-        assert float(saved["thesis_period"]) == pytest.approx(3.0, rel=0.05)
-    assert "3 µm" in ran.out

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shlex
 import webbrowser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -78,13 +77,6 @@ def test_a_material_for_blender_is_written_with_all_that_it_reads(run, orders):
     assert json.loads(Path("report.json").read_text(encoding="utf-8"))["error"]["mean"] == 0.0
 
 
-def test_a_bad_name_is_refused_before_anything_is_made(run, orders):
-    for name in ("a b", "while", "mix"):
-        line = run("export-osl", orders, "-o", "out", "--name", name).failed_in_one_line()
-        assert "--name " in line
-    assert not Path("out").exists()
-
-
 def test_an_addon_holds_the_folders_that_are_named(run, orders):
     assert run("export-osl", orders, "-o", "grating-osl").code == 0
     ran = run("export-osl", "--addon", "looks.zip", "--with", "grating-osl").succeeded()
@@ -107,15 +99,6 @@ def test_a_page_is_written_with_its_title_as_text_and_its_loss_is_named(run, pla
     assert "plate.html: " in ran.out
     assert "fast ΔE2000" in ran.out
     assert "exact" not in ran.out
-
-
-@pytest.mark.parametrize("name", ["missing.exr", "empty.exr"])
-def test_an_environment_without_a_picture_is_refused_in_one_line(run, plate, name):
-    Path("empty.exr").touch()
-    sky = f'<emitter type="envmap"><string name="filename" value="{name}"/></emitter></scene>'
-    plate.write_text(plate.read_text().replace("</scene>", sky))
-    assert name in run("export-viewer", plate, "-o", "plate.html").failed_in_one_line()
-    assert not Path("plate.html").exists()
 
 
 @pytest.fixture
@@ -169,9 +152,3 @@ def test_a_label_lies_on_the_front_of_a_mesh(run, logo):
     run("hologram", logo, "--mesh", "board.obj", "--up", "z", "-o", "a/b").succeeded()
     assert 'type="fitted_mesh"' in Path("a/b/label.xml").read_text()
     assert Path("a/b/board.obj").read_bytes() == Path("board.obj").read_bytes()
-
-
-def test_the_command_that_renders_a_hologram_can_be_typed(run, logo):
-    ran = run("hologram", logo, "--dots", "64", "-o", "my card").succeeded()
-    words = shlex.split(ran.out.splitlines()[-1].partition("mitsuba-diffraction ")[2])
-    assert words == ["render", str(Path("my card", "label.xml")), "--denoise"]

@@ -20,12 +20,6 @@ def table(heights, tmp_path):
     return file
 
 
-def test_a_height_field_is_described(run, heights):
-    ran = run("info", heights, "--pixel-size", "0.08").succeeded()
-    for part in ("height field", "75 x 75", "6 x 6 µm", "rms slope", "history", "warnings"):
-        assert part in ran.out
-
-
 def test_warnings_name_the_options_of_the_command(run, heights, here):
     np.save("tilted.npy", np.load(heights) + 0.003 * np.arange(75))
     ran = run("info", "tilted.npy", "--pixel-size", "0.08", "--level", "none").succeeded()
@@ -59,11 +53,6 @@ def test_treatments_are_listed(run, heights):
     options = ("--pixel-size", "0.08", "--level", "plane", "--periodic", "exact", "--json")
     history = json.loads(run("info", heights, *options).out)["history"]
     assert len(history) == 2
-
-
-def test_doubts_about_the_model_are_listed(run, heights):
-    data = json.loads(run("info", heights, "--pixel-size", "0.001", "--json").out)
-    assert any("RMS slope" in line for line in data["warnings"])
 
 
 def test_a_table_is_described_with_its_measured_error(run, table):
@@ -142,33 +131,11 @@ def test_heights_are_drawn(run, heights, tmp_path, depth):
         assert image.width > 3 * image.height  # a row of panels
 
 
-def test_a_recipe_is_drawn(run, tmp_path):
-    recipe = tmp_path / "grating.toml"
-    text = 'generator = "sinusoidal"\n[arguments]\nperiod = 1.6\ndepth = 0.05\nperiods = 3\n'
-    recipe.write_text(text)
-    assert run("info", recipe, "--picture", tmp_path / "recipe.pdf").code == 0
-    assert (tmp_path / "recipe.pdf").stat().st_size > 1000
-
-
 def test_a_patch_too_wide_for_its_window_is_mentioned(run, tmp_path):
     np.save(tmp_path / "wide.npy", np.random.default_rng(1).random((8, 600)) * 0.01)
     asked = ("--pixel-size", "10", "--periodic", "exact", "--json")
     data = json.loads(run("info", tmp_path / "wide.npy", *asked).out)
     assert any("so much more than the coherence window" in line for line in data["warnings"])
-
-
-def test_periods_are_described(run, tmp_path):
-    x = np.arange(200) * 0.1
-    np.save(tmp_path / "a.npy", np.tile(0.05 * np.cos(2 * np.pi * x / 2.5), (180, 1)))
-    ran = run("info", tmp_path / "a.npy", "--pixel-size", "0.1")
-    assert "2.5 µm along 0°, 100% of the variance" in ran.out
-
-
-def test_a_patch_of_nanometres_is_not_advised_a_window_of_nanometres(run, tmp_path):
-    np.save(tmp_path / "a.npy", np.random.default_rng(1).normal(0, 1e-5, (50, 50)))
-    ran = run("info", tmp_path / "a.npy", "--pixel-size", "0.006")
-    assert "--coherence-width" not in ran.out
-    assert "check its pixel size" in ran.out
 
 
 def test_a_question_about_units_is_asked_once(run, here):

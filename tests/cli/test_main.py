@@ -13,7 +13,6 @@ import warnings
 import pytest
 
 from mitsuba_diffraction import __version__
-from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from tests.support import ROOT
 from tests.support.systems import posix
@@ -39,15 +38,6 @@ def raising(error):
         raise error
 
     return action
-
-
-def test_help_names_every_command_which_has_help(run):
-    overview = run("--help")
-    assert overview.code == 0
-    for name in ("precompute", "info", "render"):
-        assert name in overview.out
-        ran = run(name, "--help").succeeded()
-        assert "--debug" in ran.out
 
 
 def test_the_parser_loads_no_command_s_machinery_and_the_package_runs_as_a_module():
@@ -154,19 +144,6 @@ def test_a_warning_is_one_line_and_said_once(run, command):
     ]
 
 
-def test_samples_below_zero_are_said_once_whatever_they_are(run, command):
-    import mitsuba as mi
-
-    def action():
-        mi.set_variant("scalar_rgb")
-        for value in (-0.1, -0.2, -0.3):
-            mi.Log(mi.LogLevel.Warn, f"Invalid sample value: [{value}, 0, 0, 1]")
-
-    ran = run(*command(action)).succeeded()
-    (line,) = ran.err.splitlines()
-    assert line.startswith("mitsuba-diffraction: warning: some samples are below zero")
-
-
 def in_bash(line, folder, file, *options):
     """Run a line of bash in a folder, whose {} is `info` of a file with options."""
     words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(file), *options]
@@ -187,15 +164,6 @@ def test_a_termination_is_an_exit_code(run, heights, monkeypatch):
     terminate = "mitsuba_diffraction.cli.info._describe"
     monkeypatch.setattr(terminate, lambda *_: signal.raise_signal(signal.SIGTERM))
     assert run("info", heights, "--pixel-size", "0.1").code == 143
-
-
-@pytest.mark.parametrize("name", ["precompute", "info", "render"])
-def test_general_options_have_defaults_and_may_stand_anywhere(name):
-    parser = build_parser()
-    args = parser.parse_args([name, "a"])
-    assert (args.debug, args.progress) == (False, None)
-    for arguments in (["--no-progress", name, "a"], [name, "a", "--no-progress"]):
-        assert parser.parse_args(arguments).progress is False
 
 
 @pytest.mark.parametrize("stream", ["--json", "text"])

@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import shlex
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,7 @@ import pytest
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.cli.arguments import OUTPUTS
 from mitsuba_diffraction.cli.main import build_parser
-from tests.support.inputs import HEIGHTS, PLY, RENDER
+from tests.support.inputs import COMMANDS, HEIGHTS, NONE, PLY, RENDER, SLOW, inputs_of
 from tests.support.systems import posix
 
 
@@ -26,44 +26,61 @@ def _contents(folder: Path) -> dict[str, tuple[int, bytes]]:
 
 
 @pytest.mark.parametrize(
-    "command",
-    [
-        f"{RENDER} -o scale.png", f"{RENDER} -o scale.exr", f"{RENDER} -o sky.exr",
-        f"{RENDER} -o ../here/sky.exr", f"{RENDER} --frames 2 --turn width -o frames",
-        f"{RENDER} --assign ball=t.exr -o t.exr",
-        f"{RENDER} --preset ball=cd,pigment=sky.exr -o sky.exr",
-        "brdf-map recipe.toml -o h.exr", "evaluate recipe.toml -o h.png",
-        "spectrum recipe.toml -o pigment.csv --pigment pigment.csv",
-        f"spectrum h.npy {HEIGHTS} -o h.csv",
-        "plan scale.xml -o recipe.toml", "tangents mesh.ply -o mesh.ply",
-        "precompute recipe.toml -o h.exr", f"precompute t.exr {HEIGHTS} -o t.exr",
-        "solve profile.txt --period 0.6 -o profile.nc", "orders orders.nc -o orders.csv",
-        "tonemap sky.exr -o sky.png", f"export-bsdf h.npy {HEIGHTS} -o h.bsdf",
-        f"export-shader h.npy {HEIGHTS} -o folder",
-        f"export-osl h.npy {HEIGHTS} -o folder --name a",
-        "export-viewer scale.xml -o page.html -m scalar_rgb", "compare scale.xml -o folder",
-        "view scale.xml -o page.html -m scalar_rgb",
-        "hologram logo.png -o folder", f"survey h.npy {HEIGHTS} -o folder",
-        f"sweep method h.npy {HEIGHTS} -o h.png", "tradeoff h.npy --pixel-size 0.1 -o folder",
-    ],
-)  # fmt: skip
-def test_a_given_output_over_an_input_is_refused_before_the_work(run, world, command):
-    """Where the output's name is not an input's, the input is a link of that name."""
-    beside = {
-        "scale.exr": "t.exr", "h.exr": "h.npy", "h.png": "h.npy", "h.csv": "h.npy",
-        "profile.nc": "profile.txt", "orders.csv": "orders.nc", "sky.png": "sky.exr",
-        "h.bsdf": "h.npy", "page.html": "sky.exr",
-        "frames/frame_0001.png": "scale.png", "folder/diffraction.glsl": "h.npy",
-        "folder/a.osl": "h.npy", "folder/compare.json": "sky.exr", "folder/ring.xml": "logo.png",
-        "folder/samples.csv": "h.npy", "folder/depth.png": "h.npy",
-    }  # fmt: skip
-    for name, source in beside.items():
-        if name.split("/")[0] in command and not Path(name).exists():
-            Path(name).parent.mkdir(exist_ok=True)
-            os.link(source, name)
+    ("command", "first", "output"),
+    [(words, all_.split()[0], one) for words, all_ in COMMANDS + SLOW for one in all_.split()],
+    ids=lambda text: text[:40],
+)
+def test_a_given_output_over_an_input_is_refused_before_the_work(
+    run, world, command, first, output
+):
+    """The output is a link to the last of the files that the command reads, by way of others."""
+    out, made = f"out{first}", f"out{output}"
+    if not output.startswith("."):
+        out, made = "out", f"out/{output}"
+    Path(made).parent.mkdir(exist_ok=True)
+    os.link(inputs_of(command, world)[-1], made)
     before = _contents(world)
-    assert "would overwrite" in run(*shlex.split(command)).failed_in_one_line()
+    line = run(*shlex.split(command), "-o", out).failed_in_one_line()
+    assert "would overwrite" in line
     assert _contents(world) == before
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("command", "outputs"), COMMANDS, ids=lambda text: text[:40])
+def test_no_output_of_any_name_replaces_an_input(
+    run, original, world, command, outputs, monkeypatch
+):
+    """Outputs called after each input, with every suffix, in several spellings; then defaults."""
+    # a process for each `solve` would take longer to start than to solve
+    monkeypatch.setattr("mitsuba_diffraction.orders.solve.jobs.processes", ThreadPoolExecutor)
+    first, *_ = inputs = inputs_of(command, world)
+    before = {name: (original / name).read_bytes() for name in inputs}
+
+    def check(*options: str) -> list[str]:
+        """Run the command, check its inputs, and tidy up; the names of what it has made."""
+        run(*shlex.split(command), *options)
+        assert {name: (world / name).read_bytes() for name in inputs} == before, options
+        made = [str(f.relative_to(world)) for f in world.rglob("*") if f.is_file()]
+        shutil.rmtree(world)
+        shutil.copytree(original, world)
+        os.chdir(world)
+        return [name for name in made if not (world / name).exists()]
+
+    spellings = itertools.cycle(["{}", "../here/./{}"])
+    suffixes = [output for output in outputs.split() if output.startswith(".")]
+    for name, suffix in itertools.product(sorted(inputs), suffixes):
+        check("-o", next(spellings).format(f"{Path(name).stem}{suffix}"))
+    for name in sorted(inputs):
+        check("--json", next(spellings).format(name))
+    # what the command makes by default are links to an input in the next run
+    made = check()
+    for name, link in zip(made, itertools.cycle([os.link, os.symlink]), strict=False):
+        (world / name).parent.mkdir(parents=True, exist_ok=True)
+        link(world / first, world / name)
+    run(*shlex.split(command))
+    for name in made:
+        assert (world / name).samefile(world / first), name
+    check()
 
 
 def test_a_default_output_over_an_input_gets_another_name_in_one_line(run, world):
@@ -110,15 +127,6 @@ def test_links_to_an_input_are_that_input(run, world, link):
     assert (world / "mesh.ply").read_text() == PLY
 
 
-def test_pictures_and_buffers_beside_a_gltf_are_inputs(run, world):
-    document = {"asset": {"version": "2.0"}, "images": [{"uri": "a%20b.png"}],
-                "buffers": [{"uri": "m.bin", "byteLength": 4}]}  # fmt: skip
-    Path("m.gltf").write_text(json.dumps(document))
-    shutil.copy("scale.png", "a b.png")
-    line = run("render", "m.gltf", "--preset", "cd", "-o", "a b.png").failed_in_one_line()
-    assert "would overwrite 'a b.png'" in line
-
-
 @posix
 @pytest.mark.parametrize("name", ["pipe.png", "null.png"])
 def test_a_pipe_or_a_device_as_output_is_refused(run, world, name):
@@ -135,10 +143,10 @@ def test_the_library_may_replace_what_it_has_read(world):
     assert Path("t.exr").read_bytes() == before
 
 
-def test_every_option_that_names_an_output_is_known():
+def test_every_command_is_tried_and_every_option_that_names_an_output_is_known():
     """An output that counted as an input would be refused the second time."""
     parsers = next(a.choices for a in build_parser()._actions if isinstance(a.choices, dict))
-    assert isinstance(parsers, dict)
+    assert {command.split()[0] for command, _ in COMMANDS + SLOW} == {*parsers} - NONE
     named = {
         action.dest for parser in parsers.values() for action in parser._actions
         if str(action.help).startswith("write") and action.metavar

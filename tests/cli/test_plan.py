@@ -9,7 +9,6 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from docs.make.figures import tables
 from mitsuba_diffraction.optics.colour import linear_srgb
 from tests.support.directions import rough_patch
 
@@ -122,16 +121,6 @@ def test_a_picture_lacks_at_most_the_share_of_light_that_the_plan_states(picture
     assert 0.02 < stated <= 0.1
     # bins that the limit crosses count as outside, and lobes of the last orders reach beyond it
     assert 0.0 < missing <= stated
-
-
-def test_a_page_shows_what_is_needed(planned, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- begin plan -->\nstale\n<!-- end plan -->\n", "utf-8")
-    assert tables.main(["plan", str(planned[0].parent / "report.json"), "-o", str(page)]) == 0
-    (table,) = planned[1]["tables"]
-    text = page.read_text("utf-8")
-    assert f"| table | {table['whole']['memory_mb']:.2g} MB |" in text
-    assert f"{table['times less memory']:.1f} times less memory, and " in text
 
 
 def test_a_plan_is_made_before_rendering(run, folder, planned):

@@ -57,16 +57,6 @@ def test_a_retired_setting_is_named_and_changes_nothing(run, recipe, here):
     assert len(set(tables)) == 1
 
 
-def test_the_report_says_size_terms_taps_error_and_cost_of_a_table_that_lies_here(
-    run, heights, here
-):
-    ran = run("precompute", heights, *QUICK).succeeded()
-    assert os.listdir(here) == ["grating.exr"]
-    for part in ("75 x 75 pixels", "orders", "terms", "taps", "near order 0", "tolerance 0.001",
-                 " s, ", "GB of memory"):  # fmt: skip
-        assert part in ran.out
-
-
 def test_recipes_say_where_their_tables_go_or_these_lie_here(run, recipe, here):
     other, silent = (recipe.with_name(f"{name}.toml") for name in ("other", "silent"))
     text = recipe.read_text()
@@ -94,13 +84,6 @@ def test_tilt_is_said_before_the_work_and_once(run, heights, here, monkeypatch):
 
     monkeypatch.setattr(DiffractionTable, "build", build)
     assert line in run("precompute", "tilted.npy", *raw).err
-
-
-def test_what_is_cut_off_is_reported(run, heights, here):
-    ran = run(
-        "precompute", heights, *QUICK[:2], "--coherence-width", "3", "--crop", "3,4.8"
-    ).succeeded()
-    assert "cropped to the middle 3.04 x 4.8 µm of 6 x 6 µm (38 x 60 of 75 x 75 pixels)" in ran.out
 
 
 def test_a_warning_of_the_heights_is_said_once(run, heights, here):

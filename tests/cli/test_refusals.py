@@ -31,6 +31,9 @@ _EVALUATE = (
     "evaluate grating.npy --pixel-size 0.08 --coherence-width 12 --step 40 --angle-step 0.5 "
     "--positions 2 --periodic exact"
 )
+_SKY = room.PLATE.format(bsdf=room.SKIN).replace(
+    "</scene>", '<emitter type="envmap"><string name="filename" value="{}"/></emitter></scene>'
+)
 
 #: Beginnings of files, called `NAME.exr`.
 DAMAGED = {"empty": b"", "exr": b"\x76\x2f\x31\x01", "png": b"\x89PNG\r\n\x1a\n", "ab": b"ab"}
@@ -72,6 +75,7 @@ REFUSED = {
         "--measured none.csv": "'none.csv' does not exist",
         "--measured measured.csv": "and the spectrum 400 to 700 nm; give others by",
         "--observer dragon": "dragon",
+        "--observer dog --cone-ratios 1,2,3": "expected 2 numbers",
     },
     # heights with notes, which would be in vain
     f"spectrum noise.npy {_SMALL}": {"--coat-ior 0.5": "--coat-ior 0.5 must be"},
@@ -137,6 +141,7 @@ REFUSED = {
         "scale.png --pixel-size 0.1": "--max-height 0.375",
         "scale.png --max-height 0.1": "--pixel-size",
         "wrong.toml": "'wrong.toml': tolerance=2",
+        "long.toml": "is not TOML: the number",
         "none.npy": "'none.npy'",
         "empty.npy": "'empty.npy'",
         "cut.npy": "'cut.npy'",
@@ -169,6 +174,7 @@ REFUSED = {
         "lamellar --depth 0.1": "period",
         "lamellar --period 1": "depth",
         "missing.csv --period 1": "missing.csv",
+        "long.toml": "is not TOML: the number",
         "heap --period 1": "expected one of",
         "lamellar --period 1 --depth 0.1 --layer silicn:0.1": "layer 1: material='silicn'",
     },
@@ -192,6 +198,9 @@ REFUSED = {
         "orders.nc -o orders.nc": "it is a file",
         "orders.nc -o orders.nc/in": "cannot write",
         "--addon a.zip --with empty": "export-osl",
+        **dict.fromkeys(
+            [f"orders.nc -o out --name {n}" for n in ("'a b'", "while", "mix")], "--name "
+        ),
     },
     "export-shader": {
         "missing.toml": "missing.toml",
@@ -204,6 +213,8 @@ REFUSED = {
         "plate.xml -o a.html -m scalar_rgb": "set llvm_ad_rgb or llvm_ad_spectral",
         "plate.xml -o a.html -m llvm_ad_mono": "set llvm_ad_rgb or llvm_ad_spectral",
         "dull.xml -o a.html": "diffracts",
+        "sky.xml -o a.html": "empty.exr",
+        "skyless.xml -o a.html": "missing.exr",
     },
     "compare": {
         "plate.xml -o compared -m scalar_rgb": "set llvm_ad_rgb or llvm_ad_spectral",
@@ -396,6 +407,8 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     texts = {
         "room.xml": room.SCENE,
         "dull.xml": room.SCENE,
+        "sky.xml": _SKY.format("empty.exr"),
+        "skyless.xml": _SKY.format("missing.exr"),
         "line.obj": "v 0 0 0\nv 1 0 0\nv 2 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n",
         **{f"words.{suffix}": "words" for suffix in ("exr", "npy", "ply", "stl")},
         "empty.ply": "",
@@ -404,6 +417,7 @@ def folder(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "measured.csv": "wl,R\n800,0.1\n900,0.2\n",
         "wrong.toml": 'generator = "sinusoidal"\noutput = "a.exr"\ntolerance = 2\n'
         "[arguments]\nperiod = 1.0\ndepth = 0.1\n",
+        "long.toml": f"pixel_size = {30 * '9'}\n",
         "digits.toml": f"repeat = {5000 * '9'}\n",
         "groove.toml": 'method = "solved"\nprofile = "sinusoidal"\nmaterial = "none"\n'
         'output = "groove.nc"\n[arguments]\nperiod = 0.5\ndepth = 0.05\n',

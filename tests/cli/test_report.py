@@ -42,33 +42,6 @@ def test_numbers_of_arrays_are_plain():
     assert plain({"a": np.float32(0.5), "b": (np.int64(2), math.inf)}) == {"a": 0.5, "b": [2, None]}
 
 
-def test_units_and_nesting_read_well():
-    content = {
-        "kind": "table",
-        "wavelength_range_nm": [360.0, 830.0],
-        "error": {"near": 1.2345678e-4, "met": True},
-        "extent": [65.0, 32.5],
-        "history": ["levelled", "clipped"],
-        "patches": [{"range": 0.25, "history": []}],
-        "options": {},
-    }
-    assert list(lines_of(content)) == [
-        "kind:             table",
-        "wavelength range: 360 to 830 nm",
-        "error:",
-        "  near: 0.0001235",
-        "  met:  yes",
-        "extent:           65 x 32.5 µm",
-        "history:",
-        "  - levelled",
-        "  - clipped",
-        "patches:",
-        "  - range:   0.25 µm",
-        "    history: none",
-        "options:          none",
-    ]
-
-
 @pytest.mark.parametrize("progress", [None, False])
 def test_a_line_says_how_far_the_work_is(monkeypatch, capfd, progress):
     monkeypatch.setattr(console, "EVERY", 0.05)
@@ -124,6 +97,10 @@ def test_mitsuba_s_warnings_are_ours_and_said_once(capfd):
     with console.warnings_in_one_line():
         for _ in range(2):
             mi.Log(mi.LogLevel.Warn, "too few\nsamples")
+        for value in (-0.1, -0.2):  # of which Mitsuba tells each
+            mi.Log(mi.LogLevel.Warn, f"Invalid sample value: [{value}, 0, 0, 1]")
         mi.Log(mi.LogLevel.Info, "of no interest")
-    assert capfd.readouterr().err.splitlines() == ["mitsuba-diffraction: warning: too few samples"]
+    first, second = capfd.readouterr().err.splitlines()
+    assert first == "mitsuba-diffraction: warning: too few samples"
+    assert second.startswith("mitsuba-diffraction: warning: some samples are below zero")
     assert mi.logger().appender_count() == count

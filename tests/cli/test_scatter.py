@@ -39,20 +39,6 @@ def test_a_rough_mirror_s_spectrum_and_scatter_are_written(run, here):
         assert row["g"] == pytest.approx(2.0, abs=0.3)
 
 
-def test_a_spectrum_that_no_model_fits_has_none_and_a_wrong_wavelength_is_named(run, here):
-    waves = 0.003 * np.sin(np.arange(192) * 2 * np.pi / 8)
-    np.save("waves.npy", np.tile(waves, (192, 1)))
-    asked = ("scatter", "waves.npy", "--pixel-size", "0.2", "--periodic", "exact")
-    ran = run(*asked, "--json", "figures.json").succeeded()
-    assert "no ABg model: " in ran.out
-    row = json.loads((here / "figures.json").read_text())["wavelengths"][0]
-    assert row["a"] is row["error"] is None
-    for wrong in ("0.5", "200000"):
-        ran = run(*asked, "--wavelength", wrong)
-        assert ran.code == 2
-        assert "argument --wavelength: " in ran.err
-
-
 def test_grooves_finer_than_the_wavelength_scatter_no_light(run, here):
     """(4πσ/λ)² of all heights is 0.0016, and every order but the mirror's is evanescent."""
     np.save("fine.npy", np.tile(0.0028 * np.cos(np.arange(400) * 2 * np.pi / 10), (400, 1)))
@@ -77,12 +63,6 @@ def test_the_form_of_a_mirror_is_named_and_no_roughness(run, here, form):
     for name in ("rms_um", "tis_rayleigh_rice", "tis_table"):
         # of heights in which the form has been rounded
         assert rows[1][name] == pytest.approx(rows[0][name], rel=1e-3)
-
-
-def test_form_stays_where_another_level_is_asked_for(run, here):
-    np.save("bow.npy", np.tile(0.001 * (0.3 * np.arange(64) - 9.6) ** 2, (64, 1)))
-    asked = ("scatter", "bow.npy", "--pixel-size", "0.3", "--level", "plane")
-    assert "paraboloid" not in run(*asked).succeeded().out
 
 
 @pytest.mark.parametrize("bow", [0.0, 0.04])

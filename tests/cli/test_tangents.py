@@ -8,9 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.cli.tangents import _GUIDES
 from mitsuba_diffraction.scene.orientation import (
-    GUIDES,
     TriangleMesh,
     grid_faces,
     load_mesh,
@@ -46,10 +44,6 @@ def ball(tmp_path):
     corners /= np.linalg.norm(corners, axis=1, keepdims=True)
     obj_of(tmp_path / "ball.obj", corners, faces)
     return tmp_path / "ball.obj"
-
-
-def test_the_choices_are_those_of_the_field():
-    assert _GUIDES == GUIDES
 
 
 def test_a_mesh_without_texture_coordinates_gets_a_field(run, bare):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from mitsuba_diffraction import cluster
@@ -37,24 +39,38 @@ def picture_of(job, progress=silent):
 
 
 class Recorder:
-    """A client of one worker that is given nothing."""
+    """A client of so many workers, which are given nothing, or work in this process.
+
+    most : how many calls were under way at once.
+    """
 
     status = "running"
 
-    def __init__(self, **about):
-        self.about = {"nthreads": 1, **about}
+    def __init__(self, count=1, **about):
+        self.names, self.about = ["one", *range(1, count)], {"nthreads": 1, **about}
+        self.under_way = self.most = self.given = 0
 
     def wait_for_workers(self, *_, **__):
         pass
 
     def run(self, *_, **__):
-        return {"one": None}
+        return dict.fromkeys(self.names)
 
     def cancel(self, _):
         pass
 
     def scheduler_info(self, **_):
-        return {"workers": {"one": self.about}}
+        return {"workers": dict.fromkeys(self.names, self.about)}
+
+    def submit(self, work, *arguments, pure, priority):
+        self.under_way += 1
+        self.given += 1
+        self.most = max(self.most, self.under_way)
+        return SimpleNamespace(result=lambda: self.done(work, arguments), done=lambda: True)
+
+    def done(self, work, arguments):
+        self.under_way -= 1
+        return work(*arguments)
 
 
 def passes_of_picture(scene):

@@ -16,6 +16,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster
 from mitsuba_diffraction.cluster import calls, tasks
 from mitsuba_diffraction.cluster.jobs import WorkerCalls
+from tests.cluster.clusters import Recorder
 from tests.support.scans import PIXEL, SETTINGS, rough
 from tests.support.systems import posix
 
@@ -31,59 +32,18 @@ def alone(scan):
     return DiffractionTable.build(scan, **SETTINGS)
 
 
-class _Workers:
-    """A client of so many workers, that counts what is under way."""
-
-    status = "running"
-
-    def __init__(self, count):
-        self.count, self.under_way, self.most = count, 0, 0
-
-    def scheduler_info(self, **_):
-        return {"workers": {key: {"nthreads": 1} for key in range(self.count)}}
-
-    def wait_for_workers(self, *_, **__):
-        pass
-
-    def run(self, *_, **__):
-        return {}
-
-    def cancel(self, _):
-        pass
-
-    def submit(self, work, *arguments, pure, priority):
-        self.under_way += 1
-        self.most = max(self.most, self.under_way)
-        return _Future(self, work, arguments)
-
-
-class _Future:
-    def __init__(self, client, work, arguments):
-        self.client, self.work, self.arguments = client, work, arguments
-
-    def result(self):
-        self.client.under_way -= 1
-        return self.work(*self.arguments)
-
-    def done(self):
-        return True
-
-
 def test_few_tasks_are_under_way_however_many_there_are():
-    client = _Workers(3)
+    client = Recorder(3)
     assert list(WorkerCalls(client)(abs, range(-50, 0))) == list(range(50, 0, -1))
     assert client.most == 6
 
 
-class _Losing(_Workers):
+class Losing(Recorder):
     """Workers that are lost with every third call."""
 
-    def submit(self, *call, **how):
-        future = super().submit(*call, **how)
-        self.given = getattr(self, "given", 0) + 1
-        if self.given % 3 == 0:
-            future.work = _lost
-        return future
+    def submit(self, work, *call, **how):
+        lost = (self.given + 1) % 3 == 0
+        return super().submit(_lost if lost else work, *call, **how)
 
 
 def _lost(*_):
@@ -91,25 +51,25 @@ def _lost(*_):
 
 
 def test_calls_that_were_lost_are_given_out_again():
-    calls = WorkerCalls(_Losing(2))
+    calls = WorkerCalls(Losing(2))
     assert sorted(calls.finished(abs, [-1, -2, -3, -4])) == [(0, 1), (1, 2), (2, 3), (3, 4)]
     assert (calls.report.tasks, calls.report.retries) == (4, 1)
 
 
 def test_an_error_on_a_worker_is_one_line_with_its_name():
     with pytest.raises(DiffractionError, match=r"^worker this process: unexpected TypeError: bad"):
-        list(WorkerCalls(_Workers(1))(abs, ["no number"]))
+        list(WorkerCalls(Recorder(1))(abs, ["no number"]))
 
 
 def test_a_late_worker_with_another_version_is_named(monkeypatch):
     monkeypatch.setattr(calls, "versions", lambda: ("0.1", "0.1", "0.1"))
     with pytest.raises(DiffractionError, match=r"^worker this process: it has .* the client 0\.1"):
-        list(WorkerCalls(_Workers(1))(abs, [1]))
+        list(WorkerCalls(Recorder(1))(abs, [1]))
 
 
 def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):
     with pytest.raises(DiffractionError, match="periodic=open"):
-        cluster.build(HeightField(scan.heights, PIXEL), client=_Workers(1), **SETTINGS)
+        cluster.build(HeightField(scan.heights, PIXEL), client=Recorder(1), **SETTINGS)
 
 
 def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_path, monkeypatch):

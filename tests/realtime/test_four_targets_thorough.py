@@ -21,7 +21,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.plugin.description import describe
-from mitsuba_diffraction.realtime.glsl import Renderer, renderer
+from mitsuba_diffraction.realtime.glsl import Renderer
 from mitsuba_diffraction.realtime.glsl.features import GLSL
 from mitsuba_diffraction.realtime.web.export import make_page
 from mitsuba_diffraction.scene import read_exr
@@ -251,54 +251,6 @@ def test_the_page_shows_them_as_the_path_tracer_does(
     )
     assert opened.said == []
     check(stage, Halves(first, 2.0 * whole - first), names, 30)
-
-
-def dice(stage: Stage) -> dict[str, Any]:
-    """One cube of each surface, in rows; every other one is mirrored, with clockwise triangles."""
-    T = mi.ScalarTransform4f
-    shapes = {
-        f"die {n}": {
-            "type": "cube", "bsdf": bsdf,
-            "to_world": T().translate([2.2 * (n % 6) - 5.5, 2.2 * (n // 6) - 6.6, 0.0])
-            @ T().rotate([1, 2, 3], 50).scale([0.7 * (-1.0) ** n, 0.7, 0.7]),
-        }
-        for n, bsdf in enumerate(stage.bsdfs.values())
-    }  # fmt: skip
-    view = T().look_at([0.0, -20.0, 60.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    film = {"type": "hdrfilm", "width": 96, "height": 96}
-    light = {
-        "type": "rectangle", "emitter": {"type": "area", "radiance": 20.0},
-        "to_world": T().look_at([10.0, 0.0, 20.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
-    }  # fmt: skip
-    return {
-        "type": "scene", **shapes, "light": light, "sky": {"type": "constant"},
-        "sensor": {"type": "perspective", "fov": 14.0, "to_world": view, "film": film},
-    }  # fmt: skip
-
-
-def test_triangles_that_face_away_change_no_picture(
-    gl: Any, stage: Stage, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Closed surfaces of all materials, drawn without the triangles that face away."""
-    scene = mi.load_dict(dice(stage))
-    enable, drawn, pictures = renderer.enable_sides, list[int](), []
-
-    def noted(context: Any, winding: int) -> None:
-        drawn.append(winding)
-        enable(context, winding if len(pictures) == 0 else 0)
-
-    monkeypatch.setattr(renderer, "enable_sides", noted)
-    made = Renderer(scene, context=gl)
-    for _ in range(2):
-        light = made.progressive("fast")
-        light.advance(4)  # of the lamp and of the sky, the same samples in both pictures
-        pictures.append(light.image[..., :3].astype(float))
-        light.release()
-    made.release()
-    assert {-1, 1} <= set(drawn)
-    culled, whole = pictures
-    # a triangle behind wins where depths are equal, at the outlines
-    assert np.abs(culled - whole).mean() < 1e-3 * whole.mean()
 
 
 _CODE = """

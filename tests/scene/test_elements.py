@@ -60,37 +60,3 @@ def test_a_mesh_attribute_that_is_not_positive_is_refused():
     mesh.add_attribute("vertex_period", 1, [0.5, 1.0, 0.0])
     with pytest.raises(DiffractionError, match="vertex_period, whose least number is 0"):
         check_attributes(mesh, name_of(mesh))
-
-
-class Element:
-    """What Mitsuba's elements say of themselves."""
-
-    def __init__(self, given, kind, text=""):
-        self.given, self.kind, self.text = given, kind, text
-
-    def id(self):
-        return self.given
-
-    def class_name(self):
-        return self.kind
-
-    def __str__(self):
-        return self.text
-
-
-MESH = 'PLYMesh[\n  name = "meshes/knot.ply",\n  bbox = ...'
-
-
-@pytest.mark.parametrize(
-    ("element", "number", "name"),
-    [
-        (Element("foil", "Sphere"), 3, "foil"),
-        (Element("", "Sphere"), 0, "shape 1 (a sphere without id)"),
-        (Element("_unnamed_3", "Sphere"), None, "a sphere without id"),
-        (Element("", "AreaLight"), None, "an area light without id"),
-        (Element("_unnamed_0", "PLYMesh", MESH), 1, "shape 2 (the mesh knot.ply)"),
-        (Element("", "PLYMesh", "PLYMesh["), None, "a plymesh without id"),
-    ],
-)
-def test_without_an_id_it_is_the_file_or_the_kind_and_place(element, number, name):
-    assert name_of(element, number) == name

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.elements import has_texcoords
 from mitsuba_diffraction.scene.fitted_mesh import (
     STAGE_HEIGHT,
@@ -62,21 +61,6 @@ def test_a_fitted_mesh_stands_centred_on_the_floor(up, scale, shift):
 @pytest.mark.parametrize(("axis", "up"), [(1, "y"), (2, "z")])
 def test_what_has_feet_stands_on_them(axis, up, name):
     assert fit_of(mesh(table(axis)), Path(name)).up == up
-
-
-@pytest.mark.parametrize(
-    ("positions", "said"),
-    [
-        (np.zeros((4, 3)), "on a line"),
-        (table(2) * [1.0, 0.0, 0.0], "on a line"),
-        (np.where(np.arange(3) == 1, np.nan, table(2)), "vertex 0 is not finite"),
-    ],
-)
-def test_a_mesh_that_cannot_stand_is_refused(positions, said):
-    with pytest.raises(DiffractionError, match=said):
-        fit_of(mesh(positions), FILE)
-    with pytest.raises(DiffractionError, match="choose one of"):
-        fit_of(mesh(table(2)), FILE, "up")
 
 
 @pytest.mark.parametrize("name", ["a.ply", "a.obj"])

@@ -6,21 +6,16 @@ import os
 import signal
 
 import drjit as dr
-import hypothesis
 import mitsuba as mi
 import numpy as np
 import pytest
-from hypothesis import strategies as st
 
 from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.scene.passes import (
     Pass,
-    Span,
     Stop,
-    added,
     render_pass,
     render_passes,
-    samples_per_pass,
 )
 from tests.support.room import QUICK, SCENE, pixels
 
@@ -81,52 +76,6 @@ def test_one_thread_gives_the_same_bits_again_and_several_almost(scene, own_thre
     # single precision: some 250 samples add to a pixel, each rounded by 6e-8 of the sum
     for other in films(2):
         np.testing.assert_allclose(other, first, rtol=0, atol=1e-6 * first.max())
-
-
-class Tree:
-    """A sum as text, that counts how many exist."""
-
-    alive = most = 0
-
-    def __init__(self, text):
-        self.text = text
-        Tree.alive += 1
-        Tree.most = max(Tree.most, Tree.alive)
-
-    def __del__(self):
-        Tree.alive -= 1
-
-    def __add__(self, other):
-        return Tree(f"({self.text} {other.text})")
-
-
-@hypothesis.settings(max_examples=40)
-@hypothesis.given(st.integers(1, 150), st.lists(st.integers(0, 6), max_size=3))
-def test_however_passes_are_cut_they_are_added_in_one_tree(count, sizes):
-    def whole(span):
-        return None if span.count > 1 else Tree(f"{span.first}")
-
-    def cut(span, sizes):
-        """As a group, added from its tasks, added from theirs."""
-        parts = span.pieces(2 ** sizes[0]) if sizes else [span]
-        if len(parts) == 1:
-            return added(span, whole)
-        sums = [cut(part, sizes[1:]) for part in parts]
-        return added(Span(0, len(sums)), lambda at: None if at.count > 1 else sums[at.first])
-
-    Tree.alive = Tree.most = 0
-    expected = added(Span(0, count), whole).text
-    assert Tree.most <= np.log2(count) + 3  # sums of the tree, the two that are added, their sum
-    assert cut(Span(0, count), sorted(sizes, reverse=True)).text == expected
-
-
-def test_a_pass_of_one_size_divides_the_samples():
-    pixels = 512 * 512
-    mi.set_variant("llvm_ad_rgb")
-    assert [samples_per_pass(spp, pixels) for spp in (256, 100, 97, 4)] == [8, 5, 8, 4]
-    assert samples_per_pass(256, 10**9) == 1
-    mi.set_variant("scalar_rgb")
-    assert samples_per_pass(256, pixels) == 1
 
 
 def test_asked_to_stop_it_keeps_the_passes_so_far(scene):

@@ -23,161 +23,133 @@ EXPORTED = """
 	<shape type="rectangle" id="elm__4" name="elm__4"><ref id="mat-Ground" name="bsdf"/></shape>
 """
 SETTINGS = ",coherence_width=4,energy_conserving=false"
-DISK = '<shape type="disk"><ref id="skin"/></shape>'
+GRATING = f"grating.toml{SETTINGS}"
+DISK = '<shape type="disk" id="disk"><ref id="skin"/></shape>'
+METAL, PIGMENT = (
+    skin(f'<string name="{name}" value="{value}"/>') + DISK
+    for name, value in (("material", "Al"), ("pigment", "0.25"))
+)
+PLASTIC = '<bsdf type="plastic" id="below"/>'
+MASKED = EXPORTED.replace('"twosided" id="mat-Skin"', '"mask" id="mat-Skin"')
+ALIAS = f'{EXPORTED}<alias id="mat-Skin" as="hide"/>'
+ABOVE, GROUND = "elm__0", "elm__4"
 
 
 @pytest.fixture
-def surface(tmp_path: Path) -> Path:
+def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """`load(elements, values, say)`: a scene of these elements with surfaces put on its ids."""
     mi.set_variant("llvm_ad_spectral")
-    scene_file(tmp_path, EXPORTED)
-    return tmp_path
+    monkeypatch.chdir(tmp_path)
+    thin_grating(0.6, counts=(2, 2, 1)).save("orders.nc")
+    thin_grating(0.6, counts=(2, 2, 1), thin=True).save("sheet.nc")
+
+    def call(elements, materials, values=(), **more):
+        edits = {f"material:{name}": text for name, text in materials.items()} | dict(values)
+        return load_scene(scene_file(tmp_path, elements), edits, **more)
+
+    return call
 
 
-def bsdfs(folder: Path, materials: dict[str, str]) -> dict[str, str]:
-    """Text of each shape's BSDF, by id."""
-    values = {f"material:{k}": f"{folder / 'grating.toml'}{v}" for k, v in materials.items()}
-    scene = load_scene(folder / "scene.xml", values)
-    return {shape.id(): str(shape.bsdf()) for shape in scene.shapes()}
+#: Elements, surfaces by id; a shape, and what its BSDF has and lacks.
+EDITS = {
+    "a material": (EXPORTED, {"mat-Skin": GRATING}, ABOVE, "Diffraction[; Principled", ""),
+    "a shape": (EXPORTED, {ABOVE: GRATING}, ABOVE, "Diffraction[; Principled", ""),
+    "another shape": (EXPORTED, {ABOVE: GRATING}, GROUND, "Diffuse", "Diffraction["),
+    "a metal": (EXPORTED, {ABOVE: f"{GRATING},material=Al"}, ABOVE, "Diffraction[", "Principled"),
+    "an alias": (ALIAS, {"hide": GRATING}, ABOVE, "Diffraction[", ""),
+    "a look": (EXPORTED, {ABOVE: "preset:dvd,orientation=20"}, ABOVE,
+               "DiffractionOrders[; orientation = 20", ""),
+    "opacity of a material": (MASKED, {"mat-Skin": GRATING}, ABOVE,
+                              "Diffraction[; Principled", ""),
+    "opacity of a shape": (MASKED, {ABOVE: GRATING}, ABOVE, "Diffraction[; Principled", ""),
+    "orders over heights": (
+        skin('<float name="orientation" value="30"/>') + DISK, {"skin": "orders.nc"}, "disk",
+        "DiffractionOrders[; orientation = 30", "Diffraction[",
+    ),
+    # a metal beneath would look like chrome
+    "skin over metal": (METAL, {"skin": f"{GRATING},int_ior=1.6"}, "disk", "Diffraction[",
+                        "SmoothDiffuse; material = Al"),
+    "skin over pigment": (PIGMENT, {"skin": f"{GRATING},int_ior=1.6"}, "disk",
+                          "Diffraction[; SmoothDiffuse", ""),
+    "beneath": (skin('<bsdf type="plastic" name="beneath"/>') + DISK, {"skin": GRATING}, "disk",
+                "Diffraction[; Plastic", ""),
+    "beneath by a reference": (PLASTIC + skin('<ref id="below" name="beneath"/>') + DISK,
+                               {"skin": GRATING}, "disk", "Diffraction[; Plastic", ""),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["mat-Skin", "elm__0"])
-def test_a_surface_is_put_on_the_id_alone_over_what_is_there(surface, name):
-    texts = bsdfs(surface, {name: SETTINGS})
-    assert "Diffraction[" in texts["elm__0"]
-    assert "Principled" in texts["elm__0"]
-    assert texts["elm__0"].startswith("TwoSided[")
-    assert "Diffraction[" not in texts["elm__4"]
+@pytest.mark.parametrize(
+    ("elements", "materials", "name", "has", "lacks"), EDITS.values(), ids=EDITS
+)
+def test_a_surface_is_put_on_its_id_alone_and_keeps_what_lies_around_it(
+    load, elements, materials, name, has, lacks
+):
+    (shape,) = (shape for shape in load(elements, materials).shapes() if shape.id() == name)
+    text = str(shape.bsdf())
+    assert text.startswith("Mask[" if elements is MASKED else "TwoSided[")
+    assert [part for part in has.split("; ") if part not in text] == []
+    assert not lacks or [part for part in lacks.split("; ") if part in text] == []
+    assert text.count("Diffraction[") in (0, text.count("brdf["))
 
 
-def test_a_metal_replaces_what_is_there(surface):
-    texts = bsdfs(surface, {"mat-Skin": SETTINGS + ",material=Al", "elm__4": SETTINGS})
-    assert "Principled" not in texts["elm__0"]
-    assert "Diffuse" in texts["elm__4"]
-
-
-def test_unknown_ids_are_answered_as_typed_with_those_of_the_scene(surface):
-    with pytest.raises(DiffractionError, match="mat-Skin, mat-Ground, elm__0, elm__4") as refused:
-        bsdfs(surface, {"Pant": SETTINGS})
-    assert "'Pant'" in str(refused.value)
-    assert "material:" not in str(refused.value)
-
-
-def test_a_table_of_orders_keeps_the_orientation_of_what_it_replaces(surface):
-    thin_grating(0.6, counts=(2, 2, 1)).save(surface / "orders.nc")
-    scene = scene_file(surface, skin('<float name="orientation" value="30"/>'), DISK)
-    loaded = load_scene(scene, {"material:skin": str(surface / "orders.nc")})
-    text = str(loaded.shapes()[0].bsdf())
-    assert "DiffractionOrders[" in text
-    assert "orientation = 30" in text
-    assert "Diffraction[" not in text
-
-
-@pytest.mark.parametrize("thin", [True, False], ids=["table", "heights"])
-def test_light_goes_through_a_sheet_that_replaces_a_material(surface, thin):
-    thin_grating(0.6, counts=(2, 2, 1), thin=True).save(surface / "sheet.nc")
-    scene = scene_file(surface, '<bsdf type="diffuse" id="skin"/>', DISK)
-    heights = f"{surface / 'grating.toml'}{SETTINGS},thin=true,int_ior=1.5"
-    text = str(surface / "sheet.nc") if thin else heights
-    loaded = load_scene(scene, {"material:skin": text})
-    flags = loaded.shapes()[0].bsdf().flags()
+@pytest.mark.parametrize("text", ["sheet.nc", f"{GRATING},thin=true,int_ior=1.5"])
+def test_light_goes_through_a_sheet_that_replaces_a_material(load, text):
+    (shape,) = load(f'<bsdf type="diffuse" id="skin"/>{DISK}', {"skin": text}).shapes()
+    flags = shape.bsdf().flags()
     assert mi.has_flag(flags, mi.BSDFFlags.Transmission)
     assert not mi.has_flag(flags, mi.BSDFFlags.Diffuse)
 
 
-def test_a_look_is_put_on_an_id(surface):
-    scene = load_scene(surface / "scene.xml", {"material:mat-Skin": "preset:dvd,orientation=20"})
-    text = str(scene.shapes()[0].bsdf())
-    assert text.startswith("TwoSided[")
-    assert "DiffractionOrders[" in text
-    assert "orientation = 20" in text
-    with pytest.raises(DiffractionError, match="did you mean dvd"):
-        load_scene(surface / "scene.xml", {"material:mat-Skin": "preset:dvdd"})
+@pytest.mark.parametrize(
+    ("elements", "materials", "words"),
+    [
+        (EXPORTED, {"Pant": GRATING}, "'Pant'.*mat-Skin, mat-Ground, elm__0, elm__4"),
+        (EXPORTED, {"mat-Skin": "preset:dvdd"}, "did you mean dvd"),
+        (f'<bsdf type="diffuse" id="spare"/>{EXPORTED}', {"spare": GRATING},
+         "no shape uses .*'spare'; .*mat-Skin, mat-Ground"),
+        (EXPORTED, {"mat-Skin": GRATING, ABOVE: GRATING}, "no shape is left .*'mat-Skin', since"),
+        (EXPORTED, {ABOVE: GRATING, "mat-Skin": GRATING}, "no shape is left .*'mat-Skin', since"),
+        (ALIAS, {"hide": GRATING, "mat-Skin": GRATING}, "both ids are of one BSDF"),
+    ],
+)  # fmt: skip
+def test_an_edit_that_acts_on_nothing_is_refused(load, elements, materials, words):
+    with pytest.raises(DiffractionError, match=words) as refused:
+        load(elements, materials)
+    assert "material:" not in str(refused.value)
 
 
-@pytest.mark.parametrize("old", ["material=Al", "pigment=0.25"])
-def test_skin_in_place_of_a_diffracting_surface_lies_over_its_pigment_alone(surface, old):
-    name, value = old.split("=")
-    scene_file(surface, skin(f'<string name="{name}" value="{value}"/>'), DISK)
-    text = bsdfs(surface, {"skin": SETTINGS + ",int_ior=1.6"}).popitem()[1]
-    # a metal beneath would look like chrome
-    assert text.count("Diffraction[") == text.count("brdf[")
-    assert ("SmoothDiffuse" in text) == (name == "pigment")
-    assert "material = Al" not in text
-
-
-def test_a_bsdf_that_no_shape_uses_is_refused_with_those_in_use(surface):
-    scene_file(surface, '<bsdf type="diffuse" id="spare"/>', EXPORTED)
-    with pytest.raises(DiffractionError, match=r"no shape uses .*'spare'; .*mat-Skin, mat-Ground"):
-        bsdfs(surface, {"spare": SETTINGS})
-
-
-@pytest.mark.parametrize("part", ['<bsdf type="plastic"', '<ref id="below"'])
-def test_what_lies_beneath_a_replaced_surface_is_kept(surface, part):
-    scene_file(surface, '<bsdf type="plastic" id="below"/>', skin(f'{part} name="beneath"/>'), DISK)
-    text = bsdfs(surface, {"skin": SETTINGS}).popitem()[1]
-    assert "Plastic" in text
-    assert text.count("Diffraction[") == 2  # on both sides
-
-
-@pytest.mark.parametrize("order", [1, -1])
-def test_a_surface_that_another_one_hides_is_refused(surface, order):
-    both = {"mat-Skin": SETTINGS, "elm__0": SETTINGS}
-    with pytest.raises(DiffractionError, match=r"no shape is left .*'mat-Skin', since elm__0"):
-        bsdfs(surface, dict([*both.items()][::order]))
-
-
-def test_two_ids_of_one_bsdf_get_one_surface(surface):
-    scene_file(surface, EXPORTED, '<alias id="mat-Skin" as="hide"/>')
-    assert "Diffraction[" in bsdfs(surface, {"hide": SETTINGS})["elm__0"]
-    with pytest.raises(DiffractionError, match="both ids are of one BSDF"):
-        bsdfs(surface, {"hide": SETTINGS, "mat-Skin": SETTINGS})
-
-
-@pytest.mark.parametrize("name", ["mat-Skin", "elm__0"])
-def test_the_opacity_around_a_replaced_bsdf_is_kept(surface, name):
-    scene_file(surface, EXPORTED.replace('"twosided" id="mat-Skin"', '"mask" id="mat-Skin"'))
-    text = bsdfs(surface, {name: SETTINGS})["elm__0"]
-    assert text.startswith("Mask[")
-    assert "Diffraction[" in text
-    assert "Principled" in text
-
-
-def test_each_edit_is_said_with_its_shapes_and_index(surface):
+def test_each_edit_is_said_with_its_shapes_and_index(load):
     lines: list[str] = []
-    values = {
-        "material:mat-Skin": f"{surface / 'grating.toml'}{SETTINGS},int_ior=1.6",
-        "height_scale": "0.5",
-    }
-    load_scene(surface / "scene.xml", values, say=lines.append)
+    load(
+        EXPORTED, {"mat-Skin": f"{GRATING},int_ior=1.6"}, {"height_scale": "0.5"}, say=lines.append
+    )
     assert lines[0].startswith("mat-Skin: grating.toml")
     assert lines[1].startswith("height_scale=0.5")
     assert all("on 1 shape (elm__0)" in line and "n = 1.6" in line for line in lines)
 
 
-def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(surface):
-    metal = f"{surface / 'grating.toml'}{SETTINGS},material=Al"
+def test_a_parameter_that_only_a_replaced_surface_reads_is_refused(load):
+    metal = {"skin": f"{GRATING},material=Al"}
     radius = '<default name="r" value="1"/>'
     ball = '<shape type="sphere"><float name="radius" value="$r"/><ref id="skin"/></shape>'
-    scene = scene_file(surface, radius, skin('<float name="lateral_scale" value="$r"/>'), ball)
-    load_scene(scene, {"material:skin": metal, "r": "2"})  # of the sphere
-    stretched = skin('<float name="lateral_scale" value="$up"/>')
-    scene_file(surface, radius, '<default name="up" value="0"/>', stretched, ball)
-    load_scene(scene, {"material:skin": metal, "up": "0.0"})  # the default
+    load(radius + skin('<float name="lateral_scale" value="$r"/>') + ball, metal, {"r": "2"})
+    stretched = radius + '<default name="up" value="0"/>'
+    stretched += skin('<float name="lateral_scale" value="$up"/>')
+    load(stretched + ball, metal, {"up": "0.0"})  # the default
     with pytest.raises(DiffractionError, match=r"up=2 changes nothing"):
-        load_scene(scene, {"material:skin": metal, "up": "2"})
+        load(stretched + ball, metal, {"up": "2"})
 
 
-def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(surface):
-    (surface / "lit.xml").write_text(
+def test_a_parameter_of_a_file_that_another_parameter_includes_is_accepted(load):
+    Path("lit.xml").write_text(
         """<scene version="3.0.0"><default name="power" value="1"/>
         <emitter type="constant"><float name="radiance" value="$power"/></emitter></scene>"""
     )
-    (surface / "dark.xml").write_text('<scene version="3.0.0"/>')
+    Path("dark.xml").write_text('<scene version="3.0.0"/>')
     light = '<default name="light" value="dark.xml"/><include filename="$light"/>'
-    scene = scene_file(surface, '<bsdf type="diffuse" id="skin"/>', DISK, light)
-    metal = f"{surface / 'grating.toml'}{SETTINGS},material=Al"
-    values = {"material:skin": metal, "light": str(surface / "lit.xml"), "power": "2"}
-    assert len(load_scene(scene, values).emitters()) == 1
+    scene = f'<bsdf type="diffuse" id="skin"/>{DISK}{light}', {"skin": f"{GRATING},material=Al"}
+    assert (
+        len(load(*scene, {"light": str(Path("lit.xml").resolve()), "power": "2"}).emitters()) == 1
+    )
     # the default in other words
-    values = {"material:skin": metal, "light": str(surface / "dark.xml")}
-    assert not load_scene(scene, values).emitters()
+    assert not load(*scene, {"light": str(Path("dark.xml").resolve())}).emitters()

@@ -14,81 +14,19 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.orientation import load_mesh, texture_tangents
+from mitsuba_diffraction.scene.orientation import load_mesh
 from scenes.make.__main__ import elaphe, main, xenopeltis
 from scenes.make.anatomy import Anatomy
-from scenes.make.scales import Scales
-from scenes.make.snake import Snake, build
+from scenes.make.snake import Snake
 from scenes.make.spine import coil
 from tests.support import ROOT
 
 pytestmark = pytest.mark.thorough
 
 
-@pytest.fixture(scope="module", params=["keeled", "smooth", "hose"])
-def snake(request: pytest.FixtureRequest) -> Snake:
-    """Coarse snakes of different make."""
-    if request.param == "keeled":
-        return build(scales=Scales(detail=2), head_detail=24)
-    if request.param == "smooth":
-        return build(scales=Scales(rows=15, keel=0, detail=3, fan=20.0), head_detail=30, coils=1)
-    return build(Anatomy(taper=0.0, length=90), Scales(rows=9, detail=1), head_detail=20, coils=1)
-
-
 @pytest.fixture(scope="module", params=[elaphe, xenopeltis])
 def committed(request: pytest.FixtureRequest) -> tuple[str, Snake]:
     return request.param.__name__, request.param()
-
-
-def _visible(snake: Snake) -> np.ndarray:
-    """Faces that look the way their vertex normals do: all but the undercut edges of scales."""
-    corners = snake.body.positions[snake.body.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    outward = snake.body.normals[snake.body.faces].sum(axis=1)
-    return (normal * outward).sum(axis=1) > 0
-
-
-def test_the_first_tangent_runs_along_the_body(snake: Snake) -> None:
-    body, faces = snake.body, snake.body.faces[_visible(snake)]
-    u = body.uv[faces, 0].mean(axis=1)
-    # the nose and the tail tip are poles, where the skin runs across the spine
-    middle = (u > 0.5) & (u < snake.skin.u_max - 0.3)
-    faces, u = faces[middle], u[middle]
-    sides = body.positions[faces[:, 1:]] - body.positions[faces[:, :1]]
-    dp_du, dp_dv, texture = texture_tangents(sides, body.uv[faces[:, 1:]] - body.uv[faces[:, :1]])
-    area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    # slivers that close the gaps between three scales have no texture area
-    good = np.abs(texture) > 1e-4 * area
-    assert area[good].sum() > 0.999 * area.sum()
-    dp_du, dp_dv, area, u = dp_du[good], dp_dv[good], area[good], u[good]
-
-    def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        cosine = (a * b).sum(axis=1) / np.linalg.norm(a, axis=1) / np.linalg.norm(b, axis=1)
-        return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-
-    off = angle(dp_du, snake.skin.tangent(u))
-    order = np.argsort(off)
-    share = np.cumsum(area[order]) / area.sum()
-    # scales are tilted by some 4° and bent; head and neck widen by up to 20°
-    assert off[order][np.searchsorted(share, 0.5)] < 8
-    assert off[order][np.searchsorted(share, 0.95)] < 22
-    # v runs around, and u and v measure alike: 1.3 leaves room for the flat belly and the head
-    assert np.median(np.abs(angle(dp_du, dp_dv) - 90)) < 5
-    ratio = np.median(np.linalg.norm(dp_du, axis=1) / np.linalg.norm(dp_dv, axis=1))
-    assert 1 / 1.3 < ratio < 1.3
-
-
-def test_normals_are_unit_vectors_and_point_outwards(snake: Snake) -> None:
-    normals = snake.body.normals
-    # they are normalised in double precision
-    assert np.abs(np.linalg.norm(normals, axis=1) - 1).max() < 1e-9
-    outward = snake.skin.normals(*snake.body.uv.T)
-    # scales, brows and nostrils turn them by less than a right angle
-    assert ((normals * outward).sum(axis=1) > 0).all()
-
-
-def test_the_body_is_closed(snake: Snake) -> None:
-    _assert_closed(snake)
 
 
 def test_the_committed_bodies_are_closed(committed: tuple[str, Snake]) -> None:
@@ -107,45 +45,6 @@ def _assert_closed(snake: Snake) -> None:
     counts = Counter(map(tuple, edges.tolist()))
     assert set(counts.values()) == {1}
     assert all((b, a) in counts for a, b in counts)
-
-
-def test_scales_overlap(snake: Snake) -> None:
-    """Each free end lies above the front of the scale behind it, and reaches beyond it."""
-    scales = snake.scales
-    straight = np.zeros((2, 1))
-    one, zero = np.ones(1), np.zeros(1)
-    end_u, _, end_height = scales.tile(zero, one, one, one, straight)
-    next_u, _, next_height = scales.tile(2 * one, one, zero, zero, straight)
-    assert end_u - next_u == pytest.approx(scales.overlap * scales.pitch)
-    assert end_height - next_height > 0.9 * scales.relief * scales.pitch
-
-    # and in the mesh: heights over the smooth skin reach from front to end of a scale
-    uv = snake.body.uv
-    scaled = (uv[:, 0] > 2) & (uv[:, 0] < snake.skin.u_max - 2) & (np.abs(uv[:, 1] - 0.5) < 0.3)
-    u, v = uv[scaled].T
-    over = snake.body.positions[scaled] - snake.skin.points(u, v)
-    height = (over * snake.skin.normals(u, v)).sum(axis=1) / snake.skin.circumference(u)
-    spread = np.percentile(height, 95) - np.percentile(height, 5)
-    assert 0.7 < spread / (scales.relief * scales.pitch) < 2.5
-
-
-@pytest.mark.parametrize("askew", [-1.0, 1.0])
-@pytest.mark.parametrize("keel", [0.0, 0.5])
-def test_no_scale_pierces_the_one_above(keel: float, askew: float) -> None:
-    """Along a shared edge the upper scale stays above, also where both lie askew by the most."""
-    scales = Scales(keel=keel)
-    t = np.linspace(0, 1, 21)
-    one, zero = np.ones_like(t), np.zeros_like(t)
-    tilt = np.radians(scales.irregularity) * np.stack([askew * one, askew * one])
-    upper = scales.tile(zero, 2 * one, one, t, tilt)[2]  # its left rear edge
-    lower = scales.tile(one, one, zero, t, -tilt)[2]  # a right front edge behind it
-    assert (upper >= lower).all()
-
-
-def test_building_twice_gives_the_same_mesh() -> None:
-    first, second = (build(scales=Scales(detail=1), head_detail=12) for _ in range(2))
-    for name in ("positions", "normals", "uv", "faces"):
-        np.testing.assert_array_equal(getattr(first.body, name), getattr(second.body, name))
 
 
 def test_the_scenes_hold_what_the_generator_makes(committed: tuple[str, Snake]) -> None:
@@ -167,26 +66,6 @@ def test_pigment_covers_the_whole_body(committed: tuple[str, Snake]) -> None:
     scale = float(re.search(r'"pigment_scale" value="([^"]+)"', text)[1])
     # a thousandth of the length is a millimetre of tail tip
     assert scale * snake.skin.u_max == pytest.approx(1, abs=1e-3)
-
-
-def test_loops_lie_on_the_ground_and_on_each_other(committed: tuple[str, Snake]) -> None:
-    """No loop sinks into another or into the ground by more than the height of a scale."""
-    _, snake = committed
-    anatomy = snake.skin.anatomy
-    arc = np.linspace(0, anatomy.length, 400)
-    spine = snake.skin.spine(arc)
-    wide, above, below = (np.maximum(part, 1e-3) for part in anatomy.profile(arc))
-    assert (spine[:, 2] - below).min() > -0.02
-
-    deepest = np.inf
-    for i in range(len(arc)):
-        far = np.abs(arc - arc[i]) > 8 * anatomy.girth_radius
-        aside = np.linalg.norm(spine[far, :2] - spine[i, :2], axis=1) / (wide[far] + wide[i])
-        rise = spine[far, 2] - spine[i, 2]
-        reach = np.where(rise > 0, below[far] + above[i], above[far] + below[i])
-        deepest = min(deepest, np.hypot(aside, rise / reach).min())
-    # 1 is contact; a scale is 0.06 cm high, the sum of two radii about 2.5 cm
-    assert deepest > 0.96
 
 
 @given(

@@ -82,30 +82,18 @@ _BENIGN = """<scene version="3.0.0"><integrator type="path"/>
 <bsdf type="conductor"><string name="material" value="Al"/></bsdf></shape>{}</scene>
 """
 _SHAPE = '<shape type="sphere">{}</shape>'
-#: What a scene of somebody else may have in addition, by the name of the scene.
+#: What a scene of somebody else may have in addition; tests/scene/test_parameters.py has includes.
 SCENES = {
     "plugin": _SHAPE.format('<bsdf type="unheard_of"/>'),
     "above": _SHAPE.format('<bsdf type="../outside"/>'),
     "chosen": '<default name="a" value="unheard_of"/>' + _SHAPE.format('<bsdf type="$a"/>'),
     "blender": '<shape type="blender"><integer name="verts" value="8"/></shape>',
-    "include": '<include filename="../private.xml"/>',
-    "absolute": '<include filename="{private}/private.xml"/>',
-    "linked": '<include filename="link.xml"/>',
-    "path": '<path value=".."/><include filename="private.xml"/>',
-    "nested": '<include filename="part.xml"/>',
-    "piped": '<include filename="pipe.xml"/>',
     "picture": _SHAPE.format(
         '<bsdf type="diffuse"><texture type="bitmap" name="reflectance">'
         '<string name="filename" value="pipe.png"/></texture></bsdf>'
     ),
     "spectrum": _SHAPE.format(
         '<bsdf type="diffuse"><spectrum name="reflectance" filename="pipe.csv"/></bsdf>'
-    ),
-    "heights": _SHAPE.format(
-        '<bsdf type="diffraction"><string name="filename" value="pipe.npy"/></bsdf>'
-    ),
-    "recipe": _SHAPE.format(
-        '<bsdf type="diffraction"><string name="filename" value="pipe_in.toml"/></bsdf>'
     ),
     "table": _SHAPE.format(
         '<bsdf type="diffraction_orders"><string name="filename" value="pipe.nc"/></bsdf>'
@@ -161,12 +149,9 @@ def hostile_folder(root: Path) -> Folder:
     postscript(path / "postscript.png")
     for suffix in PIPES:
         os.mkfifo(path / f"pipe.{suffix}")
-    (path / "link.xml").symlink_to(root / "private.xml")
-    (path / "part.xml").write_text('<scene version="3.0.0"><include filename="link.xml"/></scene>')
-    (path / "pipe_in.toml").write_text('source = "pipe.npy"\n')
     (path / "scene.xml").write_text(_BENIGN.format(""))
     for name, content in SCENES.items():
-        (path / f"{name}.xml").write_text(_BENIGN.format(content.replace("{private}", str(root))))
+        (path / f"{name}.xml").write_text(_BENIGN.format(content))
     _exported(path / "exported", "private.exr", root)
     elsewhere = gltf(buffers=[{"uri": "../private.exr", "byteLength": 42}])
     (path / "mesh.gltf").write_text(json.dumps(elsewhere))

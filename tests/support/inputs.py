@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,49 @@ NAMED = {
     "scale.xml": ("light.xml", "sky.exr", "scale.png", "mesh.ply", "recipe.toml", "h.npy"),
     "recipe.toml": ("h.npy",),
 }
+#: A command with each kind of input, and its outputs: suffixes, that of `-o` first, or a
+#: file in a folder of its own.
+COMMANDS = [
+    (RENDER, ".exr .png"), (f"{RENDER} --assign ball=t.exr", ".exr"),
+    (f"{RENDER} --assign ball=orders.nc", ".exr"),
+    ("render mesh.ply --patch t.exr -m scalar_rgb -s 1 -D resx=4 -D resy=3", ".exr .png"),
+    (f"{RENDER} --plan recipe.toml", ".exr"),
+    (f"{RENDER} --frames 1 --turn width", "frame_0000.png"),
+    ("plan scale.xml --paths 64", ".toml"),
+    ("brdf-map recipe.toml --resolution 8 --samples 1 --step 50", ".exr .png"),
+    ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --pigment pigment.csv "
+     "--material keratin", ".exr .png"),
+    ("brdf-map t.exr --resolution 8 --samples 1 --step 50 --layers layers.toml", ".exr"),
+    ("evaluate recipe.toml --positions 0 --step 50 --angle-step 5", ".png .csv .npz"),
+    ("spectrum t.exr --material keratin --pigment pigment.csv --step 50", ".csv .png"),
+    ("spectrum recipe.toml --step 100", ".csv .png"), ("spectrum orders.nc --step 100", ".csv"),
+    ("spectrum h.npy --treatments treatments.toml --step 100 " + SMALL, ".csv"),
+    ("tangents mesh.ply", ".ply"), ("precompute recipe.toml", ".exr"),
+    (f"precompute h.npy {HEIGHTS}", ".exr"),
+    (f"precompute scale.png {HEIGHTS} --max-height 0.1", ".exr"),
+    ("orders orders.nc --theta 0 --wavelength 500", ".csv"), ("tonemap sky.exr", ".png"),
+    (f"sweep light-angle h.npy {HEIGHTS} --resolution 8 --step 100", ".png .csv"),
+    ("export-bsdf t.exr --theta 0 --wavelength 550 --resolution 8 --format bird", ".brdf"),
+    ("export-shader t.exr --method fast", "diffraction.glsl"), ("hologram logo.png", "ring.xml"),
+    ("scatter h.npy --pixel-size 0.1 --coherence-width 2", ".csv .png"),
+    ("survey recipe.toml --resolution 8 -m llvm_ad_rgb", "samples.csv"),
+    ("export-osl t.exr --name a --material Al", "a.osl"),
+    ("solve profile.txt --period 0.6 --theta 0 --wavelength-range 500:500 --material Al", ".nc"),
+]  # fmt: skip
+#: Commands that take long, and are refused before their work.
+SLOW = [
+    ("compare scale.xml", "compare.json"), ("export-viewer scale.xml", ".html"),
+    ("tradeoff h.npy --pixel-size 0.1", "depth.png"), ("view scale.xml", ".html"),
+]  # fmt: skip
+#: Commands without a file as their output.
+NONE = {"info", "presets"}
+
+
+def inputs_of(command: str, folder: Path) -> list[str]:
+    """Files of a folder that a command reads: those in its words first, then what these name."""
+    words = [word for part in shlex.split(command) for word in part.replace("=", ",").split(",")]
+    read = [word for word in words if (folder / word).is_file()]
+    return [*read, *(name for word in read for name in NAMED.get(word, ()))]
 
 
 def write_inputs(folder: Path) -> None:

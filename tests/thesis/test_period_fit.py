@@ -115,20 +115,6 @@ def test_the_thesis_procedure_finds_the_blazed_period(of_blazed, blazed):
     assert fit.period == pytest.approx(2.5, rel=1e-3)  # they report 2500 nm
 
 
-def test_a_measured_scale_has_the_period_of_its_fingers(shared_afm):
-    patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
-    angles = np.linspace(-20.0, 75.0, 951)
-    method = methods.make("spectral", patch)
-    fit = fit_period(ridge_of(response_of(method, angles=angles)))
-    assert 1.0 < fit.period < 1.3
-    table = methods.make("spectral", patch, coherence="patch").table
-    found = window_fits(table, Beam(), WAVELENGTHS[::4], angles, count=8)
-    assert 1.0 < found.mean < 1.3
-    assert 0.02 < found.spread < 0.1
-    # published: 1144 nm, from one window on the corner
-    assert thesis_fit(table, Beam(), WAVELENGTHS, angles).period == pytest.approx(1.144, abs=0.003)
-
-
 def test_light_that_follows_no_grating_equation_is_passed_over():
     """A broad and brighter maximum near the mirror, as a bent scale has, beside the grating's."""
     line = (Beam().sine - np.sin(np.radians(ANGLES))) / (WAVELENGTHS[:, None] * 1e-3)
@@ -168,31 +154,3 @@ def test_the_second_order_is_told_from_the_first(of_blazed):
     period = find_period(response, [2.5], 2)
     fit = fit_period(ridge_of(response, 2, period=period))
     assert fit.period == pytest.approx(2.5, rel=1e-3)
-
-
-def test_a_mirror_has_no_orders_to_fit():
-    flat = HeightField(np.zeros((16, 16)), 0.5, name="flat")
-    method = methods.make("spectral", flat)
-    with pytest.raises(DiffractionError, match=r"0 of 21 wavelengths have a maximum.*too few"):
-        fit_period(ridge_of(response_of(method)))
-
-
-@pytest.mark.parametrize(
-    ("call", "text"),
-    [
-        (lambda: Beam(90.0), "theta=90 must be at least 0 and below 90"),
-        (lambda: Beam(30.0, 400.0), "phi=400 must be from -360 to 360"),
-    ],
-)
-def test_beams_out_of_range_are_refused(call, text):
-    with pytest.raises(DiffractionError, match=text):
-        call()
-
-
-def test_axes_that_make_no_plot_are_refused(of_blazed):
-    with pytest.raises(DiffractionError, match="too few; widen"):
-        response_of(of_blazed["spectral"], wavelengths=np.array([500.0]))
-    with pytest.raises(DiffractionError, match="above -90 and below 90"):
-        response_of(of_blazed["spectral"], angles=np.linspace(-95.0, 0.0, 20))
-    with pytest.raises(DiffractionError, match="order=0"):
-        ridge_of(response_of(of_blazed["spectral"], angles=ANGLES[::10]), 0)

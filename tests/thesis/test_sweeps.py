@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.analysis.maps import LightDirection, contact_sheet
+from mitsuba_diffraction.analysis.maps import LightDirection
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain
@@ -94,17 +93,6 @@ def test_relative_maps_are_the_thesis_value(grating):
     assert found.luminance[row, column] == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_contact_sheet_has_a_map_for_every_value(grating):
-    result = sweep("light-angle", grating, LightDirection(), values=[0, 10, 20, 30, 40], **SETTINGS)
-    figure = contact_sheet(
-        [s.map for s in result.steps], [s.label for s in result.steps], title="light"
-    )
-    assert [axes.get_title().split(";")[0] for axes in figure.axes] == [
-        "0°", "10°", "20°", "30°", "40°",
-    ]  # fmt: skip
-    assert figure.axes[0].get_xlim() == (-1.02, 1.02)
-
-
 def test_compiled_flss_and_default_are_timed_side_by_side(grating, some_variant):
     found = time_compiled(
         grating, LightDirection(20.0), resolution=16, samples=1, coherence_width=20.0
@@ -112,22 +100,3 @@ def test_compiled_flss_and_default_are_timed_side_by_side(grating, some_variant)
     assert found.spectral > 0.0
     assert found.ratio == found.flss / found.spectral
     assert found.colour_ratio == found.flss / found.colours
-
-
-@pytest.mark.parametrize(
-    ("kind", "arguments", "text"),
-    [
-        ("weather", {}, "sweep 'weather' is unknown"),
-        ("method", {"values": ["flss", "ray"]}, "method='ray' is unknown"),
-        ("method", {"values": []}, "0 values are to be swept"),
-        ("wavelength-step", {"values": [0.0]}, "step=0 nm does not fit"),
-        ("coherence-width", {"values": [-5.0]}, "coherence_width=-5"),
-        ("terms", {"values": [2.5]}, "terms=2.5 must be a whole number"),
-        ("terms", {"method": "pq"}, "a sweep over terms needs method 'flss'"),
-        ("light-angle", {"values": [120.0]}, "theta=120 must be"),
-        ("method", {"values": ["rainbow"], "gain": Gain()}, "no relative reflectance"),
-    ],
-)
-def test_what_does_not_fit_is_refused(grating, kind, arguments, text):
-    with pytest.raises(DiffractionError, match=text):
-        sweep(kind, grating, LightDirection(20.0), **(SETTINGS | arguments))

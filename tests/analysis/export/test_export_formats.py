@@ -12,8 +12,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.analysis.export import nodes, rgl, scatter, zemax
+from mitsuba_diffraction.analysis.export import rgl, scatter, zemax
 from mitsuba_diffraction.analysis.export.nodes import ExportGrid
 from mitsuba_diffraction.columns import read_columns
 from mitsuba_diffraction.optics.colour import delta_e
@@ -124,22 +123,6 @@ def read_zemax(path):
         values[r, t] = [[float(x) for x in next(rows).split()] for _ in range(counts[2])]
     assert next(rows) == "DataEnd"
     return head, axes, tis, values
-
-
-def test_zemax_s_file_has_f_about_the_mirror_direction(tmp_path):
-    bsdf, file = mi.load_dict(grating(material="Al")), tmp_path / "grating.bsdf"
-    grid = ExportGrid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([550.0]), 171)
-    zemax.save_zemax(bsdf, file, grid, "Al")
-    head, axes, tis, values = read_zemax(file)
-    assert (head["ScatterType"], head["Symmetry"]) == ("BRDF", "ASymmetrical4D")
-    assert list(axes) == ["SampleRotation", "AngleOfIncidence", "ScatterAzimuth", "ScatterRadial"]
-    for azimuth in (0.0, 90.0, 270.0):
-        k = np.flatnonzero(axes["ScatterAzimuth"] == azimuth)[0]
-        wo = zemax_directions(40.0, 30.0, azimuth, axes["ScatterRadial"][2:30])
-        expected = f(bsdf, polar(40.0, 210.0), wo, 550.0)
-        # means over cells of 5° x 1°, and five digits
-        np.testing.assert_allclose(values[1, 1, k, 2:30], expected, atol=0.02 * expected.max())
-    assert 0.7 < tis.min() < tis.max() < 1.0  # of aluminium, 0.91 at the normal
 
 
 def zemax_directions(theta, rotation, azimuth, radial):
@@ -285,51 +268,6 @@ def test_mirrors_and_narrow_lobes_keep_their_light_in_a_file(tmp_path, name):
                 assert whole == pytest.approx(expected, rel=0.01)
 
 
-@pytest.mark.parametrize("name", ["rgl", "zemax"])
-def test_a_scan_s_light_is_laid_by_fewer_directions_far_from_its_narrow_order_0(
-    tmp_path, monkeypatch, name
-):
-    """Beside directions as close as order 0 has them everywhere, as if all lobes were so narrow."""
-    heights = 0.03 * np.random.default_rng(1).standard_normal((20, 20))
-    heights = np.kron(heights, np.ones((8, 8)))
-    scan = md.HeightField(heights, 0.05, periodic=False)
-    bsdf = mi.load_dict(md.bsdf_dict(scan, material="Al"))
-    grid = ExportGrid(np.array([5.0, 60.0]), np.array([-180.0, 180.0]), np.array([550.0]), 64)
-    counts, evaluated = [], nodes._evaluated
-
-    def counting(bsdf, wi, wo, *rest):
-        counts[-1] += len(wo)
-        return evaluated(bsdf, wi, wo, *rest)
-
-    monkeypatch.setattr(nodes, "_evaluated", counting)
-    module, files = {"rgl": rgl, "zemax": zemax}[name], []
-    for file in ("few", "many"):
-        counts.append(0)
-        getattr(module, f"save_{name}")(bsdf, tmp_path / file, grid)
-        monkeypatch.setattr(
-            md.DiffractionTable, "window_width", md.DiffractionTable.coherence_width
-        )
-        if name == "rgl":
-            files.append(mi.tensor_io.read(str(tmp_path / file))["spectra"])
-        else:
-            files.append(read_zemax(tmp_path / file)[3])
-    few, many = map(np.array, files)
-    assert counts[0] < counts[1] / 2
-    # 0.1 % is the aim of the lattice for each hat function, and so for its light
-    np.testing.assert_allclose(few, many, rtol=0.0, atol=1e-3 * many.max())
-    assert few.sum() == pytest.approx(many.sum(), rel=1e-3)
-
-
-def test_windows_too_wide_to_integrate_and_several_wavelengths_for_zemax_are_refused(tmp_path):
-    wide = mi.load_dict(md.bsdf_dict(FLAT, coherence_width=500.0))
-    grid = ExportGrid(np.array([0.0]), np.array([0.0]), np.array([550.0]), 86)
-    with pytest.raises(DiffractionError, match="narrower"):
-        zemax.save_zemax(wide, tmp_path / "m.bsdf", grid)
-    with pytest.raises(DiffractionError, match="expected one"):
-        zemax.save_zemax(wide, tmp_path / "m.bsdf", scatter.DEFAULT)
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_csv_has_the_scatter_of_each_pair(tmp_path):
     """The same numbers as the JSON, with the columns that its first line names."""
     bsdf = mi.load_dict(grating(material="Al"))
@@ -357,54 +295,3 @@ def test_each_wavelength_has_a_band_of_its_own(tmp_path, solved):
         values.append(rows[rows[:, 4] == 700.0, 5])
     assert values[0].max() > 0.0
     np.testing.assert_allclose(values[0], values[1], rtol=1e-4, atol=1e-5 * values[0].max())
-
-
-def test_bird_s_json_has_f_of_each_pair(tmp_path):
-    bsdf, file = mi.load_dict(grating(material="Al")), tmp_path / "grating.brdf"
-    grid = ExportGrid(np.array([0.0, 40]), np.array([0.0, 30]), np.array([500.0, 600]), 16)
-    scatter.save_bird(bsdf, file, grid, "Al grating")
-    content = json.loads(file.read_text("utf-8"))
-    meta, data = content["metadata"], content["data"]
-    assert (meta["type"], meta["method"], meta["sample"]["name"]) == (
-        "BRDF", "simulation", "Al grating",
-    )  # fmt: skip
-    columns = {name: np.array(each["values"]) for name, each in data.items()}
-    assert {len(column) for column in columns.values()} == {2 * 2 * 2 * 16 * 64}
-    assert data["BRDF"]["unit"] == "sr^-1"
-    assert columns["theta_r"].max() < 90
-    assert columns["phi_r"].max() < 360
-    for wavelength in (500.0, 600.0):
-        row = columns["wavelength_i"] == wavelength
-        wi, wo = (polar(columns[f"theta_{end}"][row], columns[f"phi_{end}"][row]) for end in "ir")
-        expected = f(bsdf, wi, wo, wavelength)
-        # bands of 100 nm, over which lobes move by a third of their width, and cells of 6°
-        assert np.corrcoef(columns["BRDF"][row], expected)[0, 1] > 0.98
-
-
-@pytest.mark.parametrize(
-    ("surface", "wavelength"), [(FLAT, 300.0), (OrderTable.mirror(0.6), 900.0)]
-)
-def test_light_that_a_table_lacks_is_refused(tmp_path, surface, wavelength):
-    grid = zemax.DEFAULT._replace(wavelengths=np.array([wavelength]))
-    with pytest.raises(DiffractionError, match=rf"wavelength {wavelength:g} nm: .* to \d+ nm"):
-        zemax.save_zemax(mi.load_dict(md.bsdf_dict(surface)), tmp_path / "x.bsdf", grid)
-    assert not list(tmp_path.iterdir())
-
-
-def test_surfaces_that_transmit_and_too_large_files_are_refused(tmp_path):
-    sheet = mi.load_dict(md.bsdf_dict(thin_grating(0.6, counts=(2, 2, 1), thin=True)))
-    with pytest.raises(DiffractionError, match="light that goes through"):
-        rgl.save_rgl(sheet, tmp_path / "x.bsdf")
-    mirror = mi.load_dict(md.bsdf_dict(OrderTable.mirror(0.6)))
-    with pytest.raises(DiffractionError, match="lower the resolution"):
-        rgl.save_rgl(mirror, tmp_path / "x.bsdf", rgl.DEFAULT._replace(resolution=1000))
-    with pytest.raises(DiffractionError, match="theta: expected rising"):
-        rgl.save_rgl(mirror, tmp_path / "x.bsdf", rgl.DEFAULT._replace(theta=np.array([95.0])))
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_zemax_comment_keeps_its_units(tmp_path):
-    file = tmp_path / "a.bsdf"
-    grid = ExportGrid(np.array([0.0]), np.array([0.0]), np.array([550.0]), 9)
-    zemax.save_zemax(mi.load_dict(grating()), file, grid, "65 µm at 30°")
-    assert "# 65 um at 30 deg" in file.read_text("ascii")

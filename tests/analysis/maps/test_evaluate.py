@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, evaluate, hemisphere
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.optics.geometry import sigma_of
@@ -145,25 +144,3 @@ def test_an_rgb_variant_maps_the_colours_of_the_whole_spectrum(some_variant):
     assert found.xyz.shape == spectral.xyz.shape
     # what the colour table is built for (tables.colour_table): under 1 ΔE of brightest colours
     assert np.abs(found.xyz - spectral.xyz).sum() < 0.01 * spectral.xyz.sum()
-
-
-@pytest.mark.usefixtures("variant")
-def test_a_measured_rough_surface_keeps_what_its_roughness_says_in_the_mirror_direction(shared_afm):
-    pytest.importorskip("SurfaceTopography", reason="instrument files need the extra afm")
-    field = HeightField.load(shared_afm / "nanoscope-10um.di", periodic="exact")
-    n, width, wavelength = 400, 10.0, 830.0
-    result = brdf_map(plugin(field, coherence_width=width), wavelength=wavelength, resolution=n)
-    middle = result.luminance[n // 2 - 1 : n // 2 + 1, n // 2 - 1 : n // 2 + 1].mean()
-    # at normal incidence a mirror's lobe reaches 4πσ²/λ², from f with P = 2πσ²
-    mirrored = 4 * np.pi * sigma_of(width) ** 2 / (wavelength * 1e-3) ** 2
-    kappa = 4e3 * np.pi / wavelength
-    expected = np.exp(-((kappa * field.rms_height) ** 2))  # 0.22, for Gaussian heights
-    # this patch's own |a_0|² is 1.5 % lower, and neighbouring orders reach into the lobe
-    assert middle / mirrored == pytest.approx(expected, rel=0.05)
-    assert result.albedo() == pytest.approx(1.0, abs=0.02)  # what scatters is not lost
-    # light scattered by slopes s leaves around 2s, here a little less: the lobe of a wave
-    x = centres(n)
-    along_x = result.luminance.sum(axis=0, dtype=float)
-    spread = np.sqrt((along_x * x**2).sum() / along_x.sum())
-    slope = np.std(np.diff(field.heights, axis=1)) / field.pixel_size[0]
-    assert 0.7 < spread / (2 * slope) < 1.0

@@ -12,21 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError, HeightField, OrderTable
+from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis import maps
 from mitsuba_diffraction.analysis.maps import Bands, LightDirection, brdf_map, hemisphere
 from tests.analysis.maps.mapped import GRATING, centres, mirror, plugin
-from tests.support.variants import use
-
-
-def test_the_hemisphere_s_pixels_are_those_that_it_touches():
-    n = 40
-    x = (np.arange(n * 50) + 0.5) / (n * 25) - 1  # 50² points in each pixel
-    fine = (x[:, None] ** 2 + x**2 < 1).reshape(n, 50, n, 50).any(axis=(1, 3))
-    inside = hemisphere.inside(n)
-    assert np.all(inside | ~fine)
-    assert (inside & ~fine).sum() <= 8  # touched by less than the points can tell
 
 
 @given(st.integers(1, 200))
@@ -113,67 +102,6 @@ def test_a_picture_shows_the_map_pixel_by_pixel(tmp_path):
         there = image[channel, y : y + height, x : x + width]
         here &= np.abs(there - int(shown[y, x, channel])) <= 2  # rounding, of 255
     assert here.any()  # somewhere it is, pixel by pixel
-
-
-@pytest.mark.usefixtures("variant")
-@pytest.mark.parametrize(
-    ("asked", "text"),
-    [
-        ({"theta": 90.0}, "theta=90 must be at least 0 and below 90"),
-        ({"theta": -1.0}, "theta=-1"),
-        ({"theta": float("nan")}, "theta=nan"),
-        ({"phi": 361.0}, "phi=361 must be from -360 to 360"),
-        ({"wavelength_range": (700.0, 400.0)}, "700 to 400 nm is empty"),
-        ({"wavelength_range": (0.0, 400.0)}, "0 to 400 nm is empty"),
-        ({"wavelength": float("inf")}, "inf to inf nm is empty"),
-        ({"wavelength_range": (300.0, 830.0)}, "wavelength 300 nm: the table has 360 to 830 nm"),
-        ({"step": 471.0}, "step=471 nm does not fit the range of 360 to 830 nm"),
-        ({"step": 0.0}, "step=0 nm"),
-        ({"step": float("nan")}, "step=nan nm"),
-        ({"resolution": 7}, "resolution=7 must be from 8 to 4096"),
-        ({"resolution": 10**9}, "resolution=1000000000 must be"),
-        ({"samples": 0}, "samples=0 must be from 1 to 1024"),
-        ({"illuminant": "A"}, "illuminant='A' is unknown"),
-        ({"resolution": 4096, "spectral": True}, "requires 6 GB"),
-    ],
-)
-def test_what_does_not_fit_is_refused(asked, text):
-    bsdf = plugin(HeightField(np.zeros((2, 2)), 32.5))
-    with pytest.raises(DiffractionError) as caught:
-        brdf_map(bsdf, **asked)
-    assert text in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.usefixtures("variant")
-@pytest.mark.parametrize(
-    "asked", [{"wavelength": 900.0}, {"spectral": True, "wavelength_range": (300, 830)}]
-)
-def test_light_that_a_table_of_orders_lacks_is_refused(asked):
-    bsdf = mi.load_dict(md.bsdf_dict(OrderTable.mirror(0.6)))
-    with pytest.raises(DiffractionError, match=r"wavelength \d+ nm: the table has 380 to 780 nm"):
-        brdf_map(bsdf, resolution=8, samples=1, **asked)
-
-
-def test_a_variant_without_wavelengths_is_refused():
-    mi.set_variant("scalar_rgb")
-    with pytest.raises(DiffractionError, match="variant 'scalar_rgb' does not support maps"):
-        brdf_map(mi.load_dict({"type": "diffuse"}))
-
-
-@pytest.mark.parametrize(
-    "asked",
-    [
-        {"wavelength": 550.0},
-        {"wavelength_range": (400, 700)},
-        {"spectral": True},
-        {"illuminant": "E"},
-    ],
-)
-def test_an_rgb_variant_has_no_other_light(asked):
-    use("llvm_ad_rgb")
-    with pytest.raises(DiffractionError, match="whole spectrum in daylight"):
-        brdf_map(mi.load_dict({"type": "diffuse"}), resolution=8, **asked)
 
 
 @pytest.mark.usefixtures("variant")

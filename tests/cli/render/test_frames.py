@@ -14,7 +14,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.scene.frames import Frame, write_film
+from mitsuba_diffraction.scene.frames import write_film
 from mitsuba_diffraction.scene.parameters import change_of, values_of_frames
 
 # A uniform sky alone: every pixel is as bright as `light` says.
@@ -239,12 +239,3 @@ def test_what_the_scene_does_not_use_is_said_and_leaves_no_folder(render, scene,
     line = render("--frames", "2", *more, "-o", "deep/out").failed_in_one_line()
     assert "no object of the scene uses $idle, although it declares it: write $idle where" in line
     assert os.listdir() == ["room.xml"]
-
-
-def test_what_is_no_picture_is_no_frame(tmp_path):
-    from mitsuba_diffraction.errors import DiffractionError
-
-    file = tmp_path / "frame_0000.png"
-    file.write_bytes(b"no picture")
-    with pytest.raises(DiffractionError, match="not a frame of this command"):
-        Frame(file, {}, {}).outdated(False)

@@ -12,47 +12,36 @@ from tests.support.room import QUICK, SCENE
 from tests.support.systems import posix
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        ("$spp", "$samples", "undefined parameter: $samples"),
-        ('"diffuse"', '"velvet"', "there is no bsdf plugin 'velvet'"),
-        ('"sphere"', '"ply"', "shape 'ply'"),
-        ("</scene>", "", "line"),
-        ("$spp", "some", "could not parse"),
-        ("<scene", "<bsdf", "room.xml"),
-        ('<integrator type="path"/>', '<integrator type="path"><float name="depth" value="1"/>'
-         "</integrator>", "no such parameter"),
-    ],
-)  # fmt: skip
-def test_scenes_that_do_not_load_are_one_line(run, scene, old, new, said):
-    scene.write_text(SCENE.replace(old, new))
-    assert said in run("render", scene, *QUICK).failed_in_one_line()
-    assert os.listdir() == ["room.xml"]
+def mesh(name):
+    return SCENE.replace('type="sphere">', f'type="ply"><string name="filename" value="{name}"/>')
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("text", "said"),
     [
-        ("a.obj", "# of a modeller\nv 0 0 0\n", "a.obj -o mesh.ply' first"),
-        ("a.stl", "solid a\n", "a.stl' is not a PLY, which is expected: convert it"),
-        ("a.ply", "ply\n#\n", "/a.ply' is a damaged PLY"),
+        *((text, "room.xml") for text in (None, "", "no scene", '<scene version="3.5.0">')),
+        (SCENE.replace("$spp", "$samples"), "undefined parameter: $samples"),
+        (SCENE.replace('"diffuse"', '"velvet"'), "there is no bsdf plugin 'velvet'"),
+        (SCENE.replace('"sphere"', '"ply"'), "shape 'ply'"),
+        (SCENE.replace("$spp", "some"), "could not parse"),
+        (SCENE.replace('"path"/>', '"path"><float name="depth" value="1"/></integrator>'),
+         "no such parameter"),
+        (mesh("a.obj"), "tangents a.obj -o mesh.ply' first"),
+        (mesh("a.stl"), "'a.stl' is not a PLY mesh, which the scene expects: convert it"),
+        (mesh("a.ply"), "/a.ply' is a damaged PLY"),
     ],
 )  # fmt: skip
-def test_a_mesh_of_another_format_is_answered_with_what_to_do(run, scene, name, content, said):
-    (scene.parent / name).write_text(content)
-    mesh = f'type="ply"><string name="filename" value="{name}"/>'
-    scene.write_text(SCENE.replace('type="sphere">', mesh))
+def test_what_is_no_scene_is_one_line(run, scene, text, said):
+    for name, content in (
+        ("obj", "# of a modeller\nv 0 0 0\n"),
+        ("stl", "solid\n"),
+        ("ply", "ply\n"),
+    ):
+        (scene.parent / f"a.{name}").write_text(content)
+    scene.write_text(text) if text is not None else scene.unlink()
+    before = os.listdir()
     assert said in run("render", scene, *QUICK).failed_in_one_line()
-
-
-@pytest.mark.parametrize("content", [None, "", "no scene", '<scene version="3.5.0">'])
-def test_files_that_are_no_scene_are_one_line(run, scene, content):
-    if content is None:
-        scene.unlink()
-    else:
-        scene.write_text(content)
-    assert "room.xml" in run("render", scene, *QUICK).failed_in_one_line()
+    assert os.listdir() == before
 
 
 def test_the_output_is_checked_before_the_scene_is_loaded(run, scene, monkeypatch):

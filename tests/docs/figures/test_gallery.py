@@ -7,7 +7,6 @@ import pytest
 from PIL import Image
 
 from docs.make.figures import gallery
-from docs.make.figures.pages import write_jpeg
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.cli import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of
@@ -44,15 +43,6 @@ def test_its_commands_turn_what_the_scene_has(picture):
     known = parameters_of(ROOT / args.scene)
     assert known is not None
     assert {name for name, _ in args.parameters} | set(args.turn) <= set(known)
-
-
-def test_every_scene_is_shown():
-    shown = {picture.commands[-1][2] for picture in PICTURES}
-    # for the others to include, and one that needs no picture: docs/meshes.md works with it
-    parts = {"from_blender", "daylight", "lamp", "room", "skin", "skin_two", "studio", "window"}
-    parts |= {"environment", "outdoors", "label", "ring"}
-    scenes = {path.stem for path in (ROOT / "scenes").glob("*.xml")} - parts
-    assert shown == {f"scenes/{name}.xml" for name in scenes}
 
 
 @pictures
@@ -94,24 +84,3 @@ def test_a_command_that_fails_is_named(stand_in, tmp_path):
     made = stand_in("mitsuba-diffraction render scenes/none.xml -o out/a.png")
     with pytest.raises(DiffractionError, match=r"'render scenes/none.xml .*' failed"):
         gallery.make(made, tmp_path / "a.jpg")
-
-
-def test_a_picture_without_commands_shows_the_scene_of_its_name():
-    (found,) = gallery.pictures("## A room\n\n![](images/gallery/room.jpg)\n\nA room.\n")
-    words = "mitsuba-diffraction render scenes/room.xml -o out/room.png"
-    assert found.commands == (tuple(words.split()),)
-
-
-def test_quality_gives_way_to_size(tmp_path):
-    noise = np.random.default_rng(0).integers(0, 256, (80, 100, 3), np.uint8)
-    Image.fromarray(noise).save(tmp_path / "noise.png")
-    write_jpeg(tmp_path / "noise.png", tmp_path / "best.jpg")
-    best = (tmp_path / "best.jpg").stat().st_size
-    write_jpeg(tmp_path / "noise.png", tmp_path / "small.jpg", most=best * 3 // 4)
-    assert (tmp_path / "small.jpg").stat().st_size <= best * 3 // 4
-    with pytest.raises(DiffractionError, match="more than 100"):
-        write_jpeg(tmp_path / "noise.png", tmp_path / "none.jpg", most=100)
-    assert not (tmp_path / "none.jpg").exists()
-    write_jpeg(tmp_path / "noise.png", tmp_path / "wide.jpg", width=50)
-    with Image.open(tmp_path / "wide.jpg") as image:
-        assert image.size == (50, 40)

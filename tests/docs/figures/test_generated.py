@@ -90,10 +90,3 @@ def test_a_long_table_is_a_file_with_the_same_cells(page):
     assert rows[0] == ["case", "error", "a"]
     assert rows[1:] == [[f"case {n}", f"{n} %", "|a|"] for n in range(LONG)]
     assert not old.exists()
-
-
-def test_a_short_table_stays(page):
-    table = table_of(LONG - 1)
-    long_tables.update(page, {"by-depth": table})
-    assert pages.part(page.read_text(encoding="utf-8"), "by-depth") == table.strip()
-    assert list(page.parent.iterdir()) == [page]

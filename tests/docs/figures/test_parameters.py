@@ -12,7 +12,6 @@ import pytest
 import mitsuba_diffraction as md
 from docs.make.figures import parameters
 from mitsuba_diffraction.errors import DiffractionError
-from tests.support import ROOT
 from tests.support.lanes import refusal
 
 
@@ -90,15 +89,3 @@ def test_what_is_marked_differentiable_is(some_variant, patch):
 def test_a_line_that_is_no_entry_is_refused(entry):
     with pytest.raises(DiffractionError, match="expected 'name : type"):
         parameters.groups(f"The surface\n-----------\n{entry}\n\nThe model is that.")
-
-
-@pytest.mark.parametrize("plugin", parameters.PLUGINS)
-def test_a_cell_has_at_most_25_words(plugin):
-    for name, entry in entries(plugin).items():
-        assert len(entry.text.split()) <= 25, name
-
-
-def test_the_page_is_short():
-    text = (ROOT / "docs/parameters.md").read_text(encoding="utf-8")
-    text = re.sub(r"<!-- .*? -->", "", text)  # markers, which no reader sees
-    assert len(re.findall(r"\S*\w\S*", text)) <= 2100  # words, without the marks of tables

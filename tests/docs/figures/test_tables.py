@@ -70,31 +70,6 @@ def test_speed_has_all_measured_numbers_and_goals(tmp_path):
     assert "| `eval` / `roughconductor` (Al) | 2.0 | goal 0 |" in text
 
 
-def test_a_missed_goal_is_shown_as_missed():
-    assert "**missed:** goal 0" in tables.speed(bench(met=False))["speed"]
-
-
-def test_a_graphics_card_stands_beside_the_processor(tmp_path):
-    document = bench()
-    figures = document["sections"]
-    aluminium = {"title": "eval: x", "rows": [{"name": "diffraction, Al", "values": {}}]}
-    aluminium["rows"][0] |= {"values": {"× roughconductor": 5.0}, "goals": []}
-    document["sections"] = [
-        section | {"title": section["title"].split(":")[0] + f": {kind}_ad_spectral, …"}
-        for kind in ("llvm", "cuda")
-        for section in (*figures, aluminium)
-    ]
-    frames = [
-        {"name": name, "values": {"frames/s": 80.0}, "goals": [{"goal": "100", "met": False}]}
-        for name in ("fast", "exact")
-    ]
-    document["sections"].append({"title": "frames: Crayon 9, scenes/snake.xml", "rows": frames})
-    text = written(tmp_path, "card", document)
-    assert "|  | Abacus, 2 cores | by CUDA | Crayon 9 |" in text
-    assert "| of aluminium | 5.0 | 5.0 |  |" in text
-    assert text.count("80; **missed:** 100") == 2
-
-
 def test_energy_has_rows_of_all_files(tmp_path):
     found = {"energy": {"glass": GLASS, "metal": METAL}}
     lines = written(tmp_path, "energy", found, found).splitlines()[2:-2]

@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from docs.make.figures import pages, pictures, thesis
-from mitsuba_diffraction.analysis.pictures import colour_field, patches_figure
+from mitsuba_diffraction.analysis.pictures import colour_field
 from mitsuba_diffraction.heights.gratings import cd, elaphe_like
 from mitsuba_diffraction.thesis import methods
 from tests.support import ROOT
@@ -46,16 +46,6 @@ def test_the_periods_are_made_by_one_command(tmp_path, capsys):
         assert float(cells[7].split("±")[0]) == pytest.approx(made, rel=1e-3)
     with Image.open(tmp_path / "images" / "evaluation.png") as image:
         assert min(image.size) > 300
-
-
-def test_a_row_of_panels_with_units_for_each_patch():
-    fields = [elaphe_like(20.0, 128), cd(20.0, 128)]
-    figure = patches_figure(fields)
-    panels = [axes for axes in figure.axes if axes.get_xlabel()]
-    assert len(panels) == 10
-    for axes in panels:
-        labels = axes.get_xlabel() + axes.get_ylabel()
-        assert "(" in labels or "sinθ" in labels
 
 
 def test_colours_lie_where_the_grating_throws_them():

@@ -39,12 +39,6 @@ def test_facets_meet_at_the_apex():
     assert np.ptp(heights_of(profile).heights) == pytest.approx(profile.depth, rel=0.01)
 
 
-def test_rounding_keeps_the_mean_height():
-    sharp, rounded = (heights_of(Groove(20.0, 100.0, 0.0, r).profile(2.0)) for r in (0.0, 200.0))
-    assert rounded.heights.mean() == pytest.approx(sharp.heights.mean(), abs=2e-3)
-    assert np.ptp(rounded.heights) < np.ptp(sharp.heights)
-
-
 def test_the_model_is_near_solved_orders_through_gentle_grooves():
     # 5° of glass: the model's slopes are within its range, 0.09 RMS
     profile, lam = Groove(5.0).profile(3.3), np.array([520.0])
@@ -52,10 +46,6 @@ def test_the_model_is_near_solved_orders_through_gentle_grooves():
         solved = predict.through_solved(1.52, outwards, profile, lam)
         model = predict.through_modelled(1.52, outwards, profile, lam)
         assert model == pytest.approx(solved, abs=0.02)
-
-
-def test_roughness_takes_light_out_of_the_orders():
-    assert Groove(5.0, roughness=20.0).specular(500.0, 2.0) == pytest.approx(0.777, abs=1e-3)
 
 
 @pytest.mark.thorough

@@ -6,37 +6,12 @@ import numpy as np
 import pytest
 
 from docs.make.validation import coated, filmed, rayleigh, transmitted
-from docs.make.validation.cases import COAT, Case, Light, Media, Sampled, order_sines
+from docs.make.validation.cases import Case, Light, Media, Sampled
 from docs.make.validation.compare import table_of
 from docs.make.validation.model import modelled
 from docs.make.validation.models import ANGLES, by_model, of_colours
 from docs.make.validation.solutions import stored
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.reference.fresnel import amplitudes
-
-#: Orders of 1.6 µm at 30° and 610 nm, in a coat and outside.
-INSIDE = order_sines(1.6, 610.0 / COAT, float(np.degrees(np.arcsin(0.5 / COAT))))[0]
-ORDERS, SINES = order_sines(1.6, 610.0, 30.0)
-
-
-def made(matrix: np.ndarray, *, once: bool = False) -> np.ndarray:
-    """What leaves of these orders, TE."""
-    face = np.abs(amplitudes(np.sqrt(1 - SINES**2), COAT)[0]) ** 2
-    return coated.leaving(matrix, face, np.isin(INSIDE, ORDERS), ORDERS, once=once)
-
-
-def test_of_a_structure_that_loses_nothing_all_light_leaves():
-    matrix = np.full((len(INSIDE),) * 2, 1.0 / len(INSIDE))  # whatever comes down is spread evenly
-    assert made(matrix).sum() == pytest.approx(1.0, abs=1e-12)
-    assert made(matrix, once=True).sum() < 0.8
-
-
-def test_of_a_mirror_it_is_that_of_two_mirrors():
-    matrix = 0.9 * np.eye(len(INSIDE))
-    face = np.abs(amplitudes(np.cos(np.radians(30.0)), COAT)[0]) ** 2
-    out = made(matrix)
-    assert out[ORDERS != 0] == pytest.approx(0.0)
-    assert out[ORDERS == 0] == pytest.approx(face + (1 - face) ** 2 * 0.9 / (1 - 0.9 * face))
 
 
 @pytest.mark.parametrize("grating", coated.GRATINGS[:4], ids=str)

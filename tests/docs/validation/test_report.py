@@ -8,7 +8,6 @@ import pytest
 
 from docs.make.figures.pages import part
 from docs.make.validation.__main__ import main
-from docs.make.validation.pages.markdown import joined, percent, table
 from docs.make.validation.pages.report import PAGES, page_path
 from tests.support import ROOT
 from tests.support.pages import markers
@@ -62,10 +61,3 @@ def test_a_page_that_is_missing_is_named(tmp_path, capsys):
     error = capsys.readouterr().err
     assert str(page_path(tmp_path, "conductor")) in error
     assert error.count("\n") == 1
-
-
-def test_numbers_have_the_digits_that_they_deserve():
-    values = [percent(x) for x in (0.12345, 0.012345, 0.0998, 1e-6, 0.0, -0.05, float("nan"))]
-    assert values == ["12 %", "1.2 %", "10 %", "< 0.01 %", "0 %", "−5 %", "–"]
-    assert joined([1.0, 2.5, 3.0]) == "1, 2.5 and 3"
-    assert table(["a", "b"], [["x", 1]]) == "| a | b |\n| --- | ---: |\n| x | 1 |"

@@ -7,8 +7,7 @@ import pytest
 
 from docs.make.validation import statistics
 from docs.make.validation.cases import in_plane
-from docs.make.validation.roughness import Roughness, mean_brdf, mean_order_0
-from mitsuba_diffraction import HeightField, reference
+from docs.make.validation.roughness import Roughness, mean_brdf
 
 pytestmark = pytest.mark.thorough
 
@@ -51,13 +50,6 @@ def test_the_mean_of_patches_at_random_places_is_the_ensemble():
     assert np.all(found.error < 0.09 * found.exact)
 
 
-def test_without_roughness_the_series_is_a_mirror():
-    wi, wo = in_plane(0.3), in_plane([-0.3, -0.28, 0.1])
-    flat = reference.brdf(HeightField(np.zeros((16, 16)), 0.5), wi, wo, 550.0, coherence_width=12.0)
-    closed = mean_brdf(Roughness(1e-9, 1.0), wi, wo, 550.0, coherence_width=12.0)
-    assert closed == pytest.approx(flat, rel=1e-9)  # rounding
-
-
 def test_deep_roughness_ends_in_geometrical_optics():
     # g = (κ·rms)² = 500: no coherent light, each direction sees the facets that mirror to it
     rough = Roughness(np.sqrt(500) / (2 * 2e3 * np.pi / 550), 10.0)
@@ -68,15 +60,3 @@ def test_deep_roughness_ends_in_geometrical_optics():
     density = np.exp(-((u / w) ** 2) / slope2) / (np.pi * slope2)  # of slopes
     # the series nears it as 1/g, and the window widens the lobe by less
     assert found == pytest.approx(density / (cosine * w**2), rel=0.01)
-
-
-def test_order_0_of_a_patch_is_the_mean_over_its_lags():
-    # exactly, on the grid of the pixels: mean over lags of exp(−g(1 − ρ))
-    n, extent, kappa = 128, 40.0, 20.0
-    lag = np.arange(n) * extent / n
-    lag2 = np.minimum(lag, extent - lag) ** 2
-    for rms in (0.02, 0.1):
-        g = (kappa * rms) ** 2
-        exact = np.mean(np.exp(-g * (1 - np.exp(-np.add.outer(lag2, lag2)))))
-        # the lag's spectrum is 1e-7 of its peak at the pixels' frequency
-        assert mean_order_0(Roughness(rms, 1.0), kappa, extent) == pytest.approx(exact, rel=1e-6)

@@ -24,13 +24,6 @@ def test_lobes_of_a_narrow_taper_have_the_width_of_two_gaussians():
     assert widths.mean() == pytest.approx(np.sqrt(1 / 0.5**2 + 1 / 2.0**2), rel=0.05)
 
 
-def test_a_white_spectrum_is_seen_as_it_is():
-    own = next(iter(tapers.ESTIMATORS.values()))
-    found = tapers.seen(own, lambda x, y: np.ones_like(x), 10.0, 10.0, np.array([500.0, 600.0]))
-    assert found.ratio == pytest.approx(1.0, rel=1e-9)
-    assert found.worst == pytest.approx(1.0, rel=1e-9)
-
-
 @pytest.mark.thorough
 def test_crops_have_the_light_of_the_whole():
     for found in scans.crops(120, (7.0, 10.0), np.arange(430.0, 801.0, 50.0)):

@@ -2,38 +2,33 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 
-from docs.make.validation import coated, coupled_wave, filmed, solutions, solve
+from docs.make.validation import coated, filmed, solve
 from docs.make.validation.agreement import on_cells, on_gratings
 from docs.make.validation.cases import (
-    FEW_WAVELENGTHS,
     MATERIALS,
     Case,
     Grating,
     Light,
     Media,
     grating_cases,
-    index_of,
 )
 from docs.make.validation.patches import CELLS
 from docs.make.validation.solutions import (
     CONVERGED,
     DATA,
-    Orders,
-    Solutions,
     Solved,
     load,
-    save,
     shipped,
 )
 from docs.make.validation.solve import main, solve_case
 from mitsuba_diffraction.errors import DiffractionError
+from tests.support.refusals import refused
 
 pytestmark = pytest.mark.thorough
 
@@ -63,13 +58,6 @@ def test_every_case_is_there_and_nearly_all_of_them_have_converged(material):
     assert len(every.trusted().column("order")) > 0.99 * len(change)
 
 
-def test_a_solution_with_one_order_that_has_not_converged_is_left_out_as_a_whole():
-    first, *others = shipped("keratin").solved
-    assert len(first.order) > 1
-    first.change[0, 1] = 2 * CONVERGED
-    assert Solutions([first, *others]).trusted().solved == others
-
-
 @pytest.mark.parametrize("material", MATERIALS)
 def test_energy_is_conserved(material):
     every = shipped(material).trusted()
@@ -89,19 +77,6 @@ def test_two_methods_agree():
     for part in on_cells():
         assert part.deviation < part.second_change, part.case
         assert part.first_change < 0.005, part.case
-
-
-def test_aluminium_is_mitsuba_s(some_variant):
-    import mitsuba as mi
-
-    for wavelength in FEW_WAVELENGTHS:
-        for name, value in (
-            ("eta", index_of("aluminium", wavelength).real),
-            ("k", index_of("aluminium", wavelength).imag),
-        ):
-            file = str(mi.file_resolver().resolve(f"data/ior/Al.{name}.spd"))
-            nodes, values = np.loadtxt(file).T
-            assert np.interp(wavelength, nodes, values) == pytest.approx(value, abs=6e-4)  # rounded
 
 
 FILM = "oxide on aluminium"
@@ -146,32 +121,6 @@ def test_a_solver_gives_what_is_stored_again(file, solver, case, resolutions, to
         assert again.jones == pytest.approx(stored.jones, abs=tolerance)
 
 
-@needs("pySCATMECH")
-def test_coupled_waves_give_the_stored_solutions_again():
-    case = Case(Grating("blazed", 1.1, 0.4), Light(610.0, -30.0), KERATIN)
-    again = coupled_wave.solve(case, coupled_wave.resolutions(case)[0])
-    stored = kept("keratin_coupled_wave", case)
-    # the resolution from which the stored change is counted; that was stored in half floats
-    change = np.abs(again.powers - stored.powers)
-    assert change == pytest.approx(stored.change, rel=2e-3, abs=1e-7)
-
-
-@gratinglab
-def test_what_has_not_converged_is_solved_again_on_a_finer_mesh(monkeypatch):
-    # short walls in grazing light, and a strict limit, so that coarse meshes do for the test
-    monkeypatch.setattr(solutions, "CONVERGED", 1e-3)
-    case = Case(Grating("lamellar", 2.5, 0.05), Light(410.0, 75.0), PERFECT)
-    twice = solve_case(case, (100, 200))
-    assert not twice.converged
-    thrice, expected = solve_case(case, (100, 200, 300)), solve_case(case, (200, 300))
-    for name in ("powers", "change"):
-        assert np.array_equal(getattr(thrice, name), getattr(expected, name))
-    # what has converged is left as it is
-    easy = Case(Grating("sinusoidal", 2.5, 0.05), Light(610.0, 0.0), PERFECT)
-    long, short = (solve_case(easy, levels) for levels in ((60, 80, 5), (60, 80)))
-    assert np.array_equal(long.powers, short.powers)
-
-
 @gratinglab
 def test_the_command_solves_and_saves(tmp_path, monkeypatch, capsys):
     few = [
@@ -196,28 +145,6 @@ def test_a_solver_that_is_missing_is_named(monkeypatch, tmp_path, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_was_saved_is_loaded(tmp_path):
-    order = np.array([[0, 0], [1, -1]])
-    powers = np.array([[0.5, np.nan], [0.25, 0.125]])
-    cases = [
-        Case(surface, Light(550.0, 30.0, 45.0), KERATIN)
-        for surface in (Grating("blazed", 1.1, 0.05), CELLS["crossed grating"])
-    ]
-    coarse, fine = Orders(order[:1], powers[:1]), Orders(order, powers, jones=np.ones((2, 2, 2)))
-    made = [Solved.between(case, coarse, fine) for case in cases]
-    path = tmp_path / "x.npz"
-    save(made, {"solver": "none"}, path)
-    loaded = load(path, KERATIN)
-    assert loaded.about == {"solver": "none"}
-    for (case, solved), name in itertools.product(
-        zip(cases, loaded.solved, strict=True), ("order", "powers", "jones")
-    ):
-        assert solved.case == case
-        assert np.array_equal(getattr(solved, name), getattr(fine, name), equal_nan=True)
-        # an order that the coarse resolution lacks is new
-        assert np.array_equal(solved.change, [[0, np.nan], powers[1]], equal_nan=True)
-
-
 @pytest.mark.parametrize("content", [b"", b"not a zip"])
 def test_a_file_that_holds_no_solutions_is_refused(tmp_path, content):
     path = tmp_path / "x.npz"
@@ -232,6 +159,4 @@ def test_what_does_not_exist_is_refused_in_one_line():
         (lambda: grating_cases("gold"), "material 'gold' is unknown"),
         (lambda: Grating("wavy", 1.0, 0.1).heights(), "profile 'wavy' is unknown"),
     ):
-        with pytest.raises(DiffractionError, match=text) as error:
-            call()
-        assert "\n" not in str(error.value)
+        refused(call, text)

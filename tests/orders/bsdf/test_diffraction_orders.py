@@ -6,12 +6,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.coat import face_transmittance
 from mitsuba_diffraction.orders import OrderTable
 from tests.orders.kinds import KINDS, albedo_of, loaded, near_orders
-from tests.support.directions import as_single, polar, uniform_directions
+from tests.support.directions import polar
 from tests.support.furnace import furnace_in
 from tests.support.lanes import evaluated
 from tests.support.orders import PERIOD, load, thin_grating
@@ -59,22 +57,6 @@ def test_a_mirror_under_a_layer_reflects_what_both_faces_do(some_variant, supers
     assert np.all(np.abs(mean - both) < 4.0 * error + 5e-3), mean / both
 
 
-@pytest.mark.thorough
-def test_a_mirror_is_that_of_the_plugin_diffraction(some_variant):
-    rng = np.random.default_rng(1)
-    wi = uniform_directions(60, rng, 0.3)
-    wo = -wi + np.column_stack([rng.normal(0.0, 0.004, (60, 2)), np.zeros(60)])
-    wo[:, 2] = np.sqrt(1.0 - (wo[:, :2] ** 2).sum(axis=1))
-    lam = as_single(rng.uniform(400.0, 700.0, (60, 4)))
-    flat = md.HeightField(np.zeros((8, 8)), 0.2, periodic=True)
-    mirror = load(flat, material="none", energy_conserving=False)
-    found, expected = (
-        evaluated(bsdf, wi, wo, lam) for bsdf in (load(OrderTable.mirror(PERIOD)), mirror)
-    )
-    # beside the centre of its lobe Kirchhoff's mirror has (1 + ωi·ωo)²/(w² cosθi cosθo)
-    assert found == pytest.approx(expected, rel=5e-3)
-
-
 @pytest.mark.parametrize("kind", ["grooves", "crossed"])
 def test_a_surface_beneath_gets_the_light_that_is_in_no_order(some_variant, kind):
     table = KINDS[kind]()
@@ -89,32 +71,11 @@ def test_a_surface_beneath_gets_the_light_that_is_in_no_order(some_variant, kind
     assert found.sum() == pytest.approx(expected.sum(), rel=BENEATH[kind])
 
 
-@pytest.mark.parametrize(
-    ("kind", "parameters", "message"),
-    [
-        ("grooves", {"coherence_width": 2.0}, "periods"),
-        ("grooves", {"orientations": 1.0}, "orientation"),
-        ("grooves", {"coat_ior": 1.5}, "is a parameter of the plugin 'diffraction'"),
-        ("sheet", {"beneath": {"type": "diffuse"}}, "thin sheet"),
-        ("block", {"beneath": {"type": "diffuse"}}, "block, beneath"),
-        ("crossed", {"film_ior": 1.3}, "film_ior"),
-        ("crossed", {"height_scale": 1.3}, "height_scale"),
-        ("crossed", {"lateral_scale": 1.3}, "lateral_scale"),
-    ],
-)
-def test_unfit_parameters_are_refused_in_one_line(some_variant, kind, parameters, message):
-    with pytest.raises(Exception, match=message) as caught:
-        load(KINDS[kind](), **parameters)
-    assert isinstance(caught.value.__cause__ or caught.value, (DiffractionError, RuntimeError))
-
-
 def test_files_are_loaded_by_name(some_variant, tmp_path):
     path = tmp_path / "grating.nc"
     thin_grating(0.6, counts=(2, 2, 1)).save(path)
     bsdf = mi.load_dict({"type": "diffraction_orders", "filename": str(path)})
     assert "0.6 µm" in str(bsdf)
-    with pytest.raises(Exception, match="does not exist"):
-        mi.load_dict({"type": "diffraction_orders", "filename": str(tmp_path / "none.nc")})
 
 
 def test_in_colours_grazing_light_of_a_mirror_is_reciprocal():

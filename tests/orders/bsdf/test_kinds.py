@@ -123,19 +123,6 @@ def test_the_density_is_that_of_the_samples(some_variant, kind, theta, side):
     assert test.run(0.01, 6 if kind == "block" else 2, quiet=True), test.messages
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize(("theta", "spread"), [(0.0, 0.1), (45.0, 0.1), (75.0, 0.2)])
-def test_weights_under_a_coat_are_nearly_the_albedo(some_variant, theta, spread):
-    si, random = interaction(np.tile(polar(theta), (4096, 1)), 550.0), mi.PCG32(size=4096)
-    one, *two = (random.next_float32() for _ in range(3))
-    _, weight = loaded("coated", orientation=0.0).sample(
-        mi.BSDFContext(), si, one, mi.Point2f(*two)
-    )
-    # the lobes are sampled exactly; parts of one may lie beyond the horizon, and under a coat the
-    # chances have the face's transmittance interpolated
-    assert np.std(weight[0]) <= spread * np.mean(weight[0])
-
-
 @pytest.mark.parametrize("component", [0, 1])
 @pytest.mark.parametrize("kind", ["sheet", "block"])
 def test_a_component_is_the_light_of_its_side(some_variant, kind, component):

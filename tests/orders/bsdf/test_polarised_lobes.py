@@ -105,15 +105,3 @@ def test_a_metal_under_a_coat_has_the_matrices_of_both_mirrors(polarised, mode):
         turned = rotation(s, bases(last), last)[0] @ expected @ rotation(bases(first), s, first)[0]
         # in 16 cells, at 70° near the face's critical angle: 1.2e-2, 2.5e-4 in 64
         assert found == pytest.approx(turned / turned[0, 0], abs=0.015)
-
-
-@kernels_alone
-def test_a_spectrometer_sees_fresnel_s_reflectances_of_a_flat_metal(polarised):
-    spectra = md.spectrum(
-        load(shallow_grating(INDEX)), 56.0, [56.0], light_azimuth=25.0, relative="mirror",
-        wavelengths=LAM,
-    )  # fmt: skip
-    r_s, r_p = amplitudes(np.cos(np.radians(56.0)), INDEX)
-    # interpolation, and the mirror's lobe over the cone
-    assert spectra.s == pytest.approx(np.full((4, 1), abs(r_s) ** 2), abs=5e-3)
-    assert spectra.p == pytest.approx(np.full((4, 1), abs(r_p) ** 2), abs=5e-3)

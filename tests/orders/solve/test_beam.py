@@ -10,7 +10,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.orders.solve.orders import solve_orders
-from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
+from mitsuba_diffraction.orders.solve.profiles import lamellar, sinusoidal
 from mitsuba_diffraction.orders.solve.settings import Settings
 
 #: One wavelength.
@@ -38,20 +38,6 @@ def test_efficiencies_of_one_direction_are_those_solved():
         )
         # single precision, and the smooth curve through steps of 4 nm
         np.testing.assert_allclose(got, expected, atol=1e-3)
-
-
-def test_the_resolution_of_one_direction_is_not_that_of_grazing_light():
-    """A station of 25 channels: its grazing light has 1 % from nothing at the first resolution."""
-    profile, settings = blazed(5.0, 0.2), Settings((400.0, 400.0))
-    with pytest.warns(md.DiffractionWarning, match="nearest direction"):
-        table, finer = (
-            solve_orders(profile, "Al", theta=30.0, settings=replace(settings, resolution=number))
-            for number in (None, 50)
-        )
-    assert table.header["solver"] == "Chandezon's method, 61 harmonics"
-    light = -0.5, 0.0, 400.0, table.response.orders[:, 0]
-    missed = np.abs(table.efficiency(*light) - finer.efficiency(*light)).sum()
-    assert missed < settings.tolerance / 2
 
 
 def test_the_integral_method_solves_an_order_that_leaves_at_grazing():

@@ -7,28 +7,17 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.orders import cells
-from mitsuba_diffraction.orders.solve import crossed
 from mitsuba_diffraction.orders.solve.crossed import CrossedWaves
-from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
-from mitsuba_diffraction.orders.solve.jobs import Jobs
-from mitsuba_diffraction.orders.solve.profiles import Profile, UnitCell
+from mitsuba_diffraction.orders.solve.profiles import UnitCell
 from mitsuba_diffraction.orders.solve.settings import Settings
-from mitsuba_diffraction.orders.solve.stations import CrossedStation, Grating
+from mitsuba_diffraction.orders.solve.stations import CrossedStation
 from mitsuba_diffraction.reference.fresnel import amplitudes
 from tests.orders.kinds import light
 
 PERIOD, LAM, LIMITS, PIXELS = 0.6, 550.0, (500.0, 700.0), 24
-GLASS = material_of(1.5, LIMITS)
 Y, X = np.mgrid[:PIXELS, :PIXELS] / PIXELS
 #: Without mirror planes, so that every sign shows.
 LUMPS = 0.03 * (np.cos(2 * np.pi * X) + np.sin(2 * np.pi * (X + Y)) + np.sin(4 * np.pi * Y))
-
-
-def steps(t):
-    """Two steps to one side: blazed, so that signs of orders and angles show."""
-    return np.where(t < 1 / 3, 0.2, np.where(t < 2 / 3, 0.1, 0.0))
 
 
 def reflected(heights, periods, theta, phi, harmonics):
@@ -41,35 +30,6 @@ def reflected(heights, periods, theta, phi, harmonics):
     solved = CrossedWaves(UnitCell(heights, periods), harmonics).amplitudes(station)[0]
     powers = (np.abs(solved[orders.index((0, 0))]) ** 2).sum(axis=-1).mean(axis=0)
     return dict(zip(orders, powers.tolist(), strict=True))
-
-
-def of_grooves(theta, phi):
-    """Unpolarised efficiencies of `steps` by the boundary integral method, by order."""
-    x, z = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6]), np.repeat([0.2, 0.1, 0.0], 2)
-    grating = Grating(Profile(x, z, PERIOD), GLASS, 1.0, LIMITS)
-    sine, turn = np.sin(np.radians(theta)), np.radians(phi)
-    cell = cells.to_cell(-sine * np.cos(turn), sine * np.sin(turn), LAM, PERIOD)
-    w = float(cells.w_of(cell.k_continuous, LAM, LIMITS, PERIOD))
-    place = int(cell.band), int(cell.kind), float(cell.tau), float(cell.rho), (w,)
-    solver = IntegralSolver(grating.profile, 60)
-    j = int(cell.channel)
-    powers = np.abs(solver.amplitudes(grating.station(*place))[0, j]) ** 2
-    return {j - q: float(power) for q, power in enumerate(powers.sum(axis=-1).mean(axis=0))}
-
-
-@pytest.mark.parametrize("phi", [0.0, 20.0])
-@pytest.mark.parametrize("along", ["x", "y"])
-def test_grooves_have_the_light_of_the_integral_method(along, phi):
-    pytest.importorskip("gratinglab")
-    # a short second period keeps the harmonics along it few
-    short, rows = 0.06, slice(None, None, PIXELS // 2)
-    if along == "x":
-        found = reflected(steps(X)[rows], (PERIOD, short), 30.0, phi, 8)
-    else:
-        found = reflected(steps(Y)[:, rows], (short, PERIOD), 30.0, phi + 90.0, 8)
-    for order, truth in of_grooves(30.0, phi).items():
-        pair = (order, 0) if along == "x" else (0, order)
-        assert found[pair] == pytest.approx(truth, rel=0.01)  # 0.5 % with 17 harmonics
 
 
 def test_a_table_of_a_flat_cell_has_fresnel_s_light_of_s_and_p_in_all_directions():
@@ -108,43 +68,3 @@ def test_lumps_have_the_orders_of_ikarus():
         truth = np.mean([float(each.R_orders[each.order_index(-m, -n)]) for each in solved])
         # its 8 slices are within 3 % of 16
         assert share == pytest.approx(truth, rel=0.05, abs=1e-5)
-
-
-def test_an_interrupted_solution_goes_on(tmp_path):
-    flat, folder = HeightField(np.zeros((4, 4)), 0.05), tmp_path / "stored"
-    asked = {"theta": [0.0, 40.0], "settings": Settings((500.0, 500.0), resolution=3)}
-
-    def interrupt(done, total, text):
-        if done == 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        md.solve_orders(flat, 1.5, **asked, jobs=Jobs(folder, progress=interrupt))
-    assert len(list(folder.iterdir())) == 2
-    told = []
-    table = md.solve_orders(
-        flat, 1.5, **asked, jobs=Jobs(folder, progress=lambda *now: told.append(now[0]))
-    )
-    assert told[0] == 2
-    assert table.efficiency(0.0, 0.0, 500.0, 0, 0) == pytest.approx(0.04, rel=1e-3)
-    # another material has results of its own
-    told.clear()
-    md.solve_orders(
-        flat, 1.6, **asked, jobs=Jobs(folder, progress=lambda *now: told.append(now[0]))
-    )
-    assert told[0] == 0
-
-
-@pytest.mark.thorough
-def test_mirror_planes_give_the_light_of_mirrored_directions(monkeypatch):
-    blazed_along_y = HeightField(
-        0.05 * np.cos(2 * np.pi * X) + 0.06 * (Y < 1 / 3) + 0.03 * (Y < 2 / 3), 0.6 / PIXELS
-    )
-    assert [each is not None for each in crossed._mirrors(blazed_along_y.heights)] == [True, False]
-    settings = Settings((550.0, 550.0), resolution=3, polarised=True)
-    asked = {"theta": [0.0, 40.0], "phi": [50.0, 130.0, 290.0], "settings": settings}
-    mirrored = md.solve_orders(blazed_along_y, 1.5, **asked)
-    monkeypatch.setattr(crossed, "_mirrors", lambda heights: (None, None))
-    direct = md.solve_orders(blazed_along_y, 1.5, **asked)
-    # single precision
-    assert mirrored.response.values == pytest.approx(direct.response.values, abs=1e-7)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.materials import TISSUES
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 
@@ -72,19 +71,3 @@ def test_formulas_and_tables_of_yaml_are_read(tmp_path):
 def test_csv_has_n_and_k_in_one_table_or_in_two(text, tmp_path):
     (tmp_path / "au.csv").write_text(text)
     assert index(tmp_path / "au.csv", 550.0) == pytest.approx(0.61 + 2.425j)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "glass", "message"),
-    [("a.agf", CATALOGUE, ":SF6", "one of 2 glasses: F2, N-BK7"),
-     ("a.agf", CATALOGUE, "", "catalogue:glass"),
-     ("a.agf", CATALOGUE.replace("BK7 2", "BK7 9"), ":N-BK7", "formula 9"),
-     ("a.yml", SILICA.replace("formula 1", "formula 9"), "", "formula 9"),
-     ("a.yml", GOLD, "", "500 to 2000 nm"),
-     ("a.csv", "wl,k\n0.3,1\n0.9,2\n", "", "no column or formula of n"),
-     ("a.csv", "wl,n,k\n0.3,1,-1\n0.9,2,-1\n", "", "k at least 0")],
-)  # fmt: skip
-def test_what_a_file_lacks_is_named(name, text, glass, message, tmp_path):
-    (tmp_path / name).write_text(text)
-    with pytest.raises(DiffractionError, match=message):
-        material_of(f"{tmp_path / name}{glass}", (400.0, 700.0))

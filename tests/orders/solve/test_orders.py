@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError, HeightField
-from mitsuba_diffraction.orders import cells
+from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.solve import node_counts, orders
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import problem_of
-from mitsuba_diffraction.orders.solve.nodes import count_for
 from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import (
-    Profile,
     lamellar,
     polygon,
     read_profile,
@@ -29,16 +26,7 @@ pytest.importorskip("gratinglab")
 
 # two bands and a perfect conductor, which has no third variable: a second's work
 PROFILE = sinusoidal(0.5, 0.05)
-LOOP = np.array([[0, 0.8, 0.5, 0.5], [0, 0.5, -0.5, 1.0]])
-SPIKE = np.array([[0, 0.4, 0.4, 0.4, 0.9], [0, 0, 0.1, 0, 0]])
 SETTINGS = Settings(wavelengths=(520.0, 640.0), tolerance=0.1, polarised=True)
-COARSE = Settings(wavelengths=(550.0, 550.0), resolution=12)
-WALLS, MANY = lamellar(0.8, 0.1, 0.3), np.arange(80)
-
-
-def flat(pixel_size):
-    """A flat cell of a crossed grating."""
-    return HeightField(np.zeros((4, 4)), pixel_size)
 
 
 @pytest.fixture(scope="module")
@@ -71,15 +59,6 @@ def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
         assert total == pytest.approx(1, abs=0.02)
 
 
-def test_few_nodes_are_chosen_for_smooth_efficiencies():
-    at = cells.nodes(24)[:, None, None, None]
-    smooth, rough = 1 + 0.1 * at**2, 1 + 0.1 / (1 + 900 * (at - 0.4) ** 2)
-    assert count_for(smooth, 2, 1e-6).nodes == 3
-    needed = count_for(rough, 2, 1e-3)
-    assert needed.nodes > 12
-    assert needed.missed > count_for(rough, 2, 1e-1).missed * 1e-3
-
-
 def test_a_tolerance_that_lines_say_is_out_of_reach_is_refused_before_the_solution(monkeypatch):
     monkeypatch.setattr(node_counts, "MAX_NODES", (4, 3, 2))
     exact = replace(SETTINGS, tolerance=1e-4)
@@ -94,61 +73,6 @@ def test_the_size_of_a_table_is_announced_before_it_is_solved(announced):
     solving = [e for e in estimates if e.stage == "solving"]
     assert solving[-1].size == made.nbytes
     assert solving[0].seconds > 0
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: lamellar(1.0, -1.0), "depth"),
-        (lambda: lamellar(1.0, 0.1, 1.5), "duty"),
-        (lambda: Profile(np.array([0, 2.0]), np.zeros(2), 1.0), "one period"),
-        (lambda: Profile(np.array([0, np.nan]), np.zeros(2), 1.0), "finite"),
-        (lambda: Profile(LOOP[0], LOOP[1], 1.0), "cross"),
-        (lambda: polygon([(0, 0), (0.5, 0.1), (0.9, 0.3), (1.45, 0.02), (0.9, 0)], 1.0),
-         "crosses itself"),
-        (lambda: Profile(SPIKE[0], SPIKE[1], 1.0), "turns back"),
-        (lambda: md.solve_orders(PROFILE, "Unobtainium"), "is unknown"),
-        (lambda: md.solve_orders(PROFILE, "-1"), "index"),
-        (lambda: md.solve_orders(PROFILE, "Al", settings=Settings((50.0, 700.0))), "nm"),
-        (lambda: Settings(tolerance=2.0), "tolerance"),
-        (lambda: md.solve_orders(PROFILE, settings=Settings(method="guess")), "unknown"),
-        (lambda: md.solve_orders(lamellar(1.0, 90.0)), "lengths are in µm"),
-        (lambda: md.solve_orders(lamellar(900.0, 0.1)), "directions of light alone"),
-        (lambda: md.solve_orders("cd.toml"), "expected a profile"),
-        # listed light
-        (lambda: md.solve_orders(PROFILE, "Al", theta=95.0), "theta 95 must be"),
-        (lambda: md.solve_orders(PROFILE, "Al", theta=MANY, phi=MANY, step=0.1),
-         "choose fewer directions"),
-        (lambda: md.solve_orders(sinusoidal(8.0, 0.06), "Al", theta=0.0, settings=COARSE),
-         "resolution of at least 14"),
-        (lambda: md.solve_orders(sinusoidal(8.0, 0.06), 1.5, theta=0.0, settings=COARSE),
-         "resolution of at least 14"),
-        # thin sheets and blocks
-        (lambda: md.solve_orders(WALLS, "Al", thin=True), "clear"),
-        (lambda: md.solve_orders(WALLS, "none", thin=True), "clear"),
-        (lambda: md.solve_orders(WALLS, "1.5+0.1i", thin=True), "clear"),
-        (lambda: md.solve_orders(WALLS, "1.005", thin=True), "1.01"),
-        (lambda: md.solve_orders(WALLS, "1.5", thin=True, superstrate=1.3), "both sides"),
-        (lambda: md.solve_orders(WALLS, "Al", block=True), "clear"),
-        (lambda: md.solve_orders(WALLS, "1.5+0.1i", block=True), "clear"),
-        (lambda: md.solve_orders(WALLS, "6", block=True), "1.01 to 5"),
-        (lambda: md.solve_orders(WALLS, "1.5", settings=Settings(method="integral"), block=True),
-         "coupled"),
-        (lambda: md.solve_orders(WALLS, "1.5", settings=Settings(polarised=True), block=True),
-         "efficiencies alone"),
-        # crossed gratings
-        (lambda: md.solve_orders(flat(2.0)), "4 times the shortest wavelength"),
-        (lambda: md.solve_orders(HeightField(20.0 * np.eye(4), 0.1), 1.5),
-         "heights.* are 20 µm.* in µm"),
-        (lambda: md.solve_orders(flat(0.1), "none"), "perfect conductors"),
-        (lambda: md.solve_orders(flat(0.1), "glas"), "material"),
-        (lambda: md.solve_orders(flat(0.1), 1.5, thin=True), "leave out"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_solved_is_refused_in_one_line(make, message):
-    with pytest.raises(DiffractionError, match=message) as caught:
-        make()
-    assert "\n" not in str(caught.value)
 
 
 def test_a_line_is_read_with_its_undercut(tmp_path):
@@ -192,28 +116,6 @@ def test_slopes_are_solved_by_chandezon_s_method_and_walls_by_coupled_waves():
     for profile, method in ((PROFILE, "chandezon"), (lamellar(0.5, 0.05), "coupled")):
         grating = Grating(profile, aluminium, 1.0, SETTINGS.wavelengths)
         assert problem_of(grating, "auto", 0).method == method
-
-
-@pytest.mark.parametrize(
-    ("points", "message"),
-    [
-        ("0,1\n800,1\n800,0\n", "one period is 0 to 1.6 µm"),
-        ("0,1\n0.3,1\n0.4,0\n", "covers 0.4 µm of a period"),
-        ("0,0\n0.2,0.1\n0.6,0.1\n0.8,0\n", "covers 0.8 µm of a period"),
-        ("".join(f"{0.01 * n},0\n" for n in range(150)), "covers 1.49 µm of a period"),
-        ("x,z\n0,1\n0.3\n", "line 3"),
-        ("0,1,2\n", "line 1"),
-        ("0,nan\n1,0\n", "line 1"),
-        ("# nothing\n", "no points"),
-        ("wavelength_nm,theta_deg,order,R_s,R_p\n500,0,0,1,1\n", "read_orders"),
-    ],
-)
-def test_lines_that_are_no_period_are_refused(points, message, tmp_path):
-    file = tmp_path / "groove.csv"
-    file.write_text(points)
-    with pytest.raises(DiffractionError, match=message) as caught:
-        read_profile(file, 1.6)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("period", [1.58, 1.59, 1.595, 1.6])

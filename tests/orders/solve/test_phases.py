@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 import pytest
-from scipy.special import jv
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.orders.listing import JONES, WITH_PHASE, list_orders
@@ -91,25 +90,6 @@ def test_orders_of_shifted_grooves_turn_by_their_number(light):
     for order, matrix in there.items():
         turned = matrix * np.exp(-2j * np.pi * order[0] * shift)
         np.testing.assert_allclose(here[order], turned, atol=1e-5)  # harmonics
-
-
-def test_a_shallow_sinusoid_has_the_amplitudes_of_bessel_functions():
-    """J_m(a) (−i)^m, a = k(cosθi + cosθm) times the height's amplitude (Goodman, section 4.4.3).
-
-    Periods of 15 wavelengths, where slopes of 1 in 40 return light as a mirror does.
-    """
-    depth, period = 0.06, 8.0
-    found = solved(sinusoidal(period, depth), "Al", 0.0, 0.0, resolution=24)
-    r = fresnel(1.0, material_of("Al", SETTINGS.wavelengths).index(WAVELENGTH))[0]
-    for m in range(-2, 3):
-        cosine = np.sqrt(1.0 - (1e-3 * m * WAVELENGTH / period) ** 2)
-        a = 0.5 * WAVENUMBER * (1.0 + cosine) * depth
-        expected = r * (-1j) ** abs(m) * jv(abs(m), a) * np.exp(-1j * a)
-        # s of light towards +x and −x are opposite; incident light, from φ = 0, goes to −x
-        sign = -1.0 if m > 0 else 1.0
-        matrix = sign * expected * np.diag([1, -1])
-        # azimuths of light 10⁻⁴° from the normal
-        np.testing.assert_allclose(found[m,], matrix, rtol=0.01, atol=1e-5)
 
 
 HILL = np.zeros((8, 8))

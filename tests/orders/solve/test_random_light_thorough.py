@@ -15,15 +15,12 @@ from mitsuba_diffraction.orders.solve.accuracy import (
     measured_error,
 )
 from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.integral import IntegralSolver
 from mitsuba_diffraction.orders.solve.jobs import Jobs, problem_of
 from mitsuba_diffraction.orders.solve.nodes import located
 from mitsuba_diffraction.orders.solve.profiles import (
     UnitCell,
     blazed,
     lamellar,
-    polygon,
-    sinusoidal,
 )
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating
@@ -99,45 +96,3 @@ def test_a_crossed_grating_has_the_light_of_a_direct_solution_between_its_direct
     shares = missed(table, alike, jobs, *diffuse_light(LIGHTS, RANGE))
     assert shares.mean() < 0.015
     assert shares.max() < 0.05
-
-
-#: Of blocks.
-BLOCKS, INDEX = Settings((500.0, 560.0), tolerance=0.1, resolution=5), 1.5
-
-
-@pytest.mark.parametrize(
-    "profile",
-    [sinusoidal(0.4, 0.05), polygon([(0.0, 0.0), (0.1, 0.06), (0.3, 0.06), (0.2, 0.0)], 0.4)],
-    ids=["sinusoid", "slanted"],
-)
-def test_a_table_of_a_block_is_an_independent_solution_of_the_same_profile(profile):
-    pytest.importorskip("gratinglab")
-    table = md.solve_orders(profile, INDEX, settings=BLOCKS, block=True)
-    # the block below, as a thin sheet's upper side, with channels of the light above
-    limits = BLOCKS.wavelengths
-    side = Grating(profile, material_of(INDEX, limits), 1.0, limits, thin=True)
-    missed, total = np.zeros(2), np.zeros(2)  # in light from above, and from within
-    for kind, tau, rho in ((0, 0.3, 0.4), (0, 0.8, 0.45), (1, 0.2, 0.3)):
-        station = side.station(1, kind, tau, rho, [0.3])
-        amplitudes = IntegralSolver(profile, 50).amplitudes(station)[0]
-        powers = 0.5 * (np.abs(amplitudes) ** 2).sum(axis=(1, 3))
-        n, y, lam = station.channels, station.along[0], 1e3 * station.wavelengths[0]
-        c = np.sqrt(1.0 - y * y)
-        numbers = np.concatenate([np.arange(n), station.inside])
-        x = c * station.sines_of(numbers)
-        below = np.arange(len(numbers)) >= n
-        for j, from_within in enumerate(below):
-            found = np.where(
-                below == from_within,
-                table.efficiency(x[j], y, lam, numbers[j] - numbers, from_below=from_within),
-                table.efficiency(
-                    x[j], y, lam, numbers[j] - numbers, from_below=from_within, transmitted=True
-                ),
-            )
-            orders = numbers != numbers[j]
-            missed[int(from_within)] += np.abs(found - powers[j])[orders].sum()
-            total[int(from_within)] += powers[j][orders].sum()
-            # order 0, which has most of the light
-            assert np.abs(found - powers[j])[~orders].max() < 0.01
-    assert total.min() > 0.05
-    assert (missed < BLOCKS.tolerance * total).all()

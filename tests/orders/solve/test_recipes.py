@@ -7,14 +7,10 @@ import tempfile
 import warnings
 from pathlib import Path
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.heights import Source
-from mitsuba_diffraction.orders import OrderTable
 from mitsuba_diffraction.orders.solve.recipes import SolvedRecipe
 
 RECIPE = {
@@ -73,26 +69,3 @@ def test_any_value_is_taken_or_refused_in_one_line(key, value):
             assert "\n" not in str(error)
         else:
             assert loaded.output.suffix == ".nc"
-
-
-def test_tables_of_heights_name_the_command_instead(tmp_path):
-    file = tmp_path / "groove.toml"
-    file.write_text(text_of(RECIPE, ARGUMENTS))
-    command = f"the command 'solve {file}'"
-    for load in (Source.of, OrderTable.load):
-        with pytest.raises(DiffractionError, match=command):
-            load(file)
-
-
-def test_tables_of_another_kind_are_named(tmp_path):
-    field = md.gratings.sinusoidal(period=1.6, depth=0.05, periods=2, rows=4)
-    table = md.DiffractionTable.build(field, coherence_width=3.0, tolerance=0.05)
-    table.save(tmp_path / "scale.exr")
-    with pytest.raises(DiffractionError, match="BSDF 'diffraction'"):
-        OrderTable.load(tmp_path / "scale.exr")
-    OrderTable.mirror(0.5).save(tmp_path / "mirror.nc")
-    with pytest.raises(DiffractionError, match="mirror"):
-        md.DiffractionTable.load(tmp_path / "mirror.nc")
-    (tmp_path / "other.nc").write_bytes(b"CDF\x01" + bytes(40))
-    with pytest.raises(DiffractionError, match="read_orders"):
-        OrderTable.load(tmp_path / "other.nc")

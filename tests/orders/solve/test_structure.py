@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from docs.make.validation.light import light_on, powers_of
 from docs.make.validation.stacks import BENEATH, MIRROR, RIDGES, by_ikarus
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.orders.solve.chandezon import Chandezon
 from mitsuba_diffraction.orders.solve.coupled import CoupledWaves
 from mitsuba_diffraction.orders.solve.films import read_layers, structure_of
 from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.jobs import AUTO, Jobs, problem_of, solver_of
+from mitsuba_diffraction.orders.solve.jobs import AUTO, problem_of, solver_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
 from mitsuba_diffraction.orders.solve.profiles import blazed, lamellar, sinusoidal
-from mitsuba_diffraction.orders.solve.resolution import places_to_test, resolved
 from mitsuba_diffraction.orders.solve.settings import Settings
 from mitsuba_diffraction.orders.solve.stations import Grating, reversed_light
 
@@ -135,42 +132,6 @@ def test_the_structure_identifies_a_problem():
     assert {problem.method for problem in problems} == {"coupled"}
 
 
-@pytest.mark.parametrize(
-    ("media", "message"),
-    [
-        ({"beneath": [("1.46", 0.0)]}, "beneath 1: thickness"),
-        ({"beneath": [(0.1, ("1.5", 0.3, 0.2))]}, "must end after its beginning"),
-        ({"beneath": [(0.1, ("1.5", 0.0, 0.3), ("2", 0.2, 0.4))]}, "before the next part begins"),
-        ({"beneath": [(0.1, ("1.5", 0.3, 0.7), ("2", 0.1, 0.2))]}, "before the next part begins"),
-        ({"beneath": [(0.1, "SiO2", 0.2)]}, "parts are a material"),
-        ({"beneath": [("Alu", 0.2)]}, "did you mean Al"),
-        ({"layers": [(0.1, ("1.5", 0.3, 0.7))]}, "slices lie beneath a profile"),
-        ({"substrate": "none"}, "substrate: .*perfect conductor"),
-        ({"layers": [("1.46", 0.0)]}, "layer 1: thickness"),
-        ({"layers": [("1.4", 0.1), ("Unobtainium", 1)]}, "is unknown"),
-        ({"layers": [("none", 0.1)]}, "layer 1: .*perfect conductor"),
-        ({"layers": LAYERS, "material": "none"}, "not thin sheets or perfect"),
-    ],
-)
-def test_impossible_structures_are_refused(media, message):
-    with pytest.raises(DiffractionError, match=message):
-        grating(lamellar(PERIOD, 0.1), **media)
-
-
-def test_films_are_not_solved_by_the_integral_method():
-    with pytest.raises(DiffractionError, match="method=coupled"):
-        problem_of(filmed(blazed(PERIOD, 0.1)), "integral", 20)
-
-
-def test_a_grating_of_the_medium_above_is_refused():
-    """It reflects nothing, so that no error is a share of its light."""
-    for beneath in ((), [("1.2", 0.1)]):
-        surface = grating(lamellar(PERIOD, 0.1), "1.2", 1.2, beneath=beneath)
-        problem = problem_of(surface, "coupled", 8)
-        with pytest.raises(DiffractionError, match="reflects no light"):
-            resolved(problem, Jobs(), places_to_test(range(2)), 0.01)
-
-
 def stack_of(surface, lam):
     """Indices of flat layers from the medium above down, and thicknesses in nm."""
     structure = surface.structure
@@ -214,31 +175,6 @@ def test_two_solvers_agree_on_films_on_a_slope():
     chandezon = Chandezon(surface.profile, 8, surface.structure).amplitudes(station)
     # phases too: steps in place of the slope miss 0.014 and 0.007, as 1/steps
     assert np.abs(2 * fine - coarse - chandezon).max() < 2e-3
-
-
-@pytest.mark.parametrize(
-    ("solver", "profile"),
-    [
-        (CoupledWaves, lamellar(0.5, 0.1)), (Chandezon, sinusoidal(0.6, 0.1)),
-        (Chandezon, blazed(0.6, 0.1)),
-    ],
-    ids=["walls", "sine", "blaze"],
-)  # fmt: skip
-def test_films_move_a_profile(solver, profile):
-    """Light sees only a film that it does not pass, and no film of the medium above."""
-    bare, thick = filmed(profile, []), filmed(profile, [("Al", 0.3)], material="1.5")
-    air = filmed(profile, [(str(SUPERSTRATE), 0.07)])
-
-    def amplitudes(surface):
-        light = surface.station(1, 0, 0.35, 0.5, [0.5])
-        light = light if surface is thick else replace(station, media=light.media)
-        return solver(profile, 12, surface.structure).amplitudes(light)
-
-    station = bare.station(1, 0, 0.35, 0.5, [0.5])
-    expected = amplitudes(bare)
-    # e⁻⁴⁵ of the light reaches the glass; a moved profile gives these phases
-    assert np.abs(np.abs(amplitudes(thick)) - np.abs(expected)).max() < 1e-6
-    assert np.abs(amplitudes(air) - expected).max() < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, OrderTable
-from mitsuba_diffraction.orders.listed import Lights, listed_table
 from tests.orders.kinds import light
 from tests.support import crossed
 
@@ -38,25 +37,3 @@ def test_a_damaged_file_is_refused(tmp_path, place, cut):
     file.write_bytes(content[: int(place * len(content))] if cut else content)
     with pytest.raises(DiffractionError, match=r"crossed\.nc"):
         OrderTable.load(file)
-
-
-def lights_of(value):
-    """One light with order (0, 0) and (1, 0)."""
-    values = np.full((1, 1, 1, 1, 1, 2, 1), value)
-    one = np.array([500.0]), np.zeros(1), np.zeros(1)
-    return Lights(*one, np.array([[0, 0], [1, 0]]), values)
-
-
-@pytest.mark.parametrize(
-    ("periods", "value", "options", "message"),
-    [
-        ((0.4, 2000.0), 0.1, {}, "period=2000"),
-        ((0.4, float("nan")), 0.1, {}, "must be"),
-        ((0.4, 0.4), 0.6, {}, "sum to 1.2"),
-        ((0.4, 0.4), -0.1, {}, "at least 0"),
-        ((0.4, 0.4), 0.1, {"superstrate": 1.5}, "in air"),
-    ],
-)
-def test_what_is_no_table_is_refused(periods, value, options, message):
-    with pytest.raises(DiffractionError, match=message):
-        listed_table(lights_of(value), periods, {}, **options)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
-from mitsuba_diffraction.orders import Band, CellResponse, OrderTable, cells
+from mitsuba_diffraction.orders import OrderTable, cells
 from mitsuba_diffraction.orders.cells import Counts
 from mitsuba_diffraction.orders.rows import Kind, rows, wavelength_of
 from mitsuba_diffraction.orders.table import MARGIN
@@ -64,24 +62,6 @@ def test_orders_that_propagate_share_the_light_and_go_back_as_they_came(kind):
     assert kind in ("listed", *APART) or table.reciprocity < 1e-5  # single precision
 
 
-def test_a_mirror_reflects_order_0_alone():
-    mirror = OrderTable.mirror(0.9, 0.8)
-    m, n = orders_of(mirror)
-    expected = np.where(m == 0, 0.8, 0.0).repeat(200, axis=1)
-    assert mirror.efficiency(*light(), m, n) == pytest.approx(expected)
-
-
-def test_even_grids_follow_the_polynomials():
-    counts = Counts(16, 8, 4)
-    grid = rows(GRATING, Kind(4, cells.B, 4), counts).within
-    assert grid.shape == (17, 9, 5, 4, 4)
-    big_k = 4 + cells.sine_squared(0.5)
-    wavelength = wavelength_of(GRATING, big_k, 0.75)
-    at = cells.from_cell(4, cells.B, 2, 0.25, 0.5, wavelength, GRATING.optical_period)
-    expected = GRATING.efficiency(at.x, at.y, wavelength, 2 - np.arange(4))
-    assert grid[4, 4, 3, 2] == pytest.approx(expected, abs=2e-3)  # curvature over cells
-
-
 def test_a_coat_over_a_mirror_reflects_as_a_pair_of_mirrors():
     mirror = OrderTable.mirror(1.6, 0.8, superstrate=1.5)
     grid = rows(mirror, Kind(6, cells.A, 7), Counts(4, 4, 4))
@@ -108,32 +88,6 @@ def test_files_keep_tables(kind, tmp_path):
     again = tmp_path / "again.nc"
     loaded.save(again)
     assert again.read_bytes() == path.read_bytes()
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda a: a * 1.5,
-        lambda a: a - 0.1,
-        lambda a: np.where(a > 0.5, np.nan, a).astype(np.float32),
-        lambda a: a[:, :, :, :-1],
-        lambda a: a.astype(np.float64),
-    ],
-)
-def test_what_are_no_efficiencies_is_refused(change):
-    mirror = OrderTable.mirror(0.5)
-    bands = (*mirror.bands[:-1], Band(2, change(mirror.bands[2].a), mirror.bands[2].b))
-    with pytest.raises(DiffractionError, match="band 2"):
-        dataclasses.replace(mirror, response=CellResponse(bands))
-
-
-def test_missing_bands_and_absurd_outlines_are_refused():
-    mirror = OrderTable.mirror(0.5)
-    with pytest.raises(DiffractionError, match="expected 3"):
-        dataclasses.replace(mirror, response=CellResponse(mirror.bands[:-1]))
-    for arguments in ({"period": np.nan}, {"period": 500.0}, {"wavelengths": (700.0, 400.0)}):
-        with pytest.raises(DiffractionError):
-            OrderTable.mirror(**{"period": 0.5, **arguments})
 
 
 def test_a_header_that_is_no_object_is_refused(tmp_path, monkeypatch):

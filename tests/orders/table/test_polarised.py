@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
 from mitsuba_diffraction.reference.boundary import mueller
 from mitsuba_diffraction.reference.model import small_slope
 from tests.orders.kinds import light
@@ -58,15 +54,3 @@ def test_reversed_light_has_the_transposed_matrix(m):
     back = GRATING.mueller(-x - m * lam / (1e3 * GRATING.period), -y, lam, m)
     expected = REVERSAL @ there.swapaxes(1, 2) @ REVERSAL
     assert back == pytest.approx(expected, abs=1e-5)  # single precision
-
-
-def test_tables_without_matrices_and_matrices_of_other_efficiencies_are_refused():
-    with pytest.raises(DiffractionError, match="polarised=True"):
-        OrderTable.mirror(0.6).mueller(0.0, 0.0, 550.0, 0)
-    whole = GRATING.bands[0].a
-    larger = whole.copy()
-    larger[..., 5] *= 1.5
-    for wrong in (larger, whole[..., :3], whole[..., :7]):
-        bands = (Band(0, wrong), *GRATING.bands[1:])
-        with pytest.raises(DiffractionError, match=r"band [01]"):
-            dataclasses.replace(GRATING, response=CellResponse(bands))

@@ -7,13 +7,7 @@ import math
 import numpy as np
 import pytest
 
-import mitsuba_diffraction as md
 from mitsuba_diffraction.orders.listing import JONES, list_orders
-from mitsuba_diffraction.orders.solve.grating_index import material_of
-from mitsuba_diffraction.orders.solve.orders import solve_orders
-from mitsuba_diffraction.orders.solve.profiles import sinusoidal
-from mitsuba_diffraction.orders.solve.settings import Settings
-from mitsuba_diffraction.reference.fresnel import amplitudes as fresnel
 from tests.support import crossed
 from tests.support.orders import shallow_grating, thin_grating
 
@@ -81,28 +75,6 @@ def test_crossed_tables_have_light_of_two_periods_and_their_index(opened):
             assert values[a, b, c, 0, n, 0] == pytest.approx(share, rel=1e-6)
 
 
-def test_listed_light_has_fresnel_s_reflectance_and_phase_in_the_file(opened):
-    """M₀₀ ± M₀₁ of light across the grooves are shares of s and p; the larger one's phase."""
-    settings, height = Settings((550.0, 550.0), polarised=True, resolution=8), 0.05
-    profile = sinusoidal(0.25, 1e-6)
-    raised = type(profile)(profile.x, profile.z + height, profile.period)
-    table = solve_orders(raised, "Al", theta=40.0, settings=settings)
-    file = opened(table)
-    cosine = math.cos(math.radians(40.0))
-    r_s, r_p = fresnel(cosine, material_of("Al", (550.0, 550.0)).index(550.0))
-    n = int(np.flatnonzero(file["order_x"][:] == 0)[0])
-    place = 0, list(file["theta"][:]).index(40.0), list(file["phi"][:]).index(0.0), 0, n
-    mean, difference = file["efficiency"][place][:2]
-    np.testing.assert_allclose(
-        [mean + difference, mean - difference], np.abs([r_s, r_p]) ** 2, rtol=1e-5
-    )
-    assert file["phase"].units == "radian"
-    assert file["phase"].dimensions == file["efficiency"].dimensions[:-1]
-    way = -4e3 * math.pi / 550.0 * height * cosine
-    turned = np.exp(1j * (file["phase"][place] - way))
-    assert turned == pytest.approx(r_s / abs(r_s), abs=1e-4)  # |r_s| > |r_p|
-
-
 def test_lists_have_the_lines_of_the_csv(opened, tmp_path):
     table, light = shallow_grating(0.97 + 6.4j, 0.1), ([520.0, 560.0], [0.0, 40.0], [0.0, 60.0])
     for options, names in (({"polarised": True}, ("R_s", "R_p")), ({"jones": True}, JONES)):
@@ -121,37 +93,3 @@ def test_lists_have_the_lines_of_the_csv(opened, tmp_path):
             assert file[name].units == "1"
             np.testing.assert_allclose(file[name][:][places], lines[name], rtol=1e-6, atol=1e-12)
             assert np.isfinite(file[name][:]).sum() == len(lines)
-
-
-@pytest.mark.parametrize("grooves", [True, False])
-def test_the_library_s_own_files_are_imported(grooves, tmp_path):
-    """NetCDF 4, compressed, as the library writes it by default."""
-    pytest.importorskip("h5py")
-    if grooves:
-        listing = list_orders(thin_grating(0.6, counts=(2, 2, 1)), [500.0, 550.0], [0.0, 40.0])
-    else:
-        listing = list_orders(crossed.table(), [500.0, 550.0], [0.0, 40.0], np.arange(0, 360, 60))
-    listing.save(tmp_path / "classic.nc")
-    listing.save(tmp_path / "lines.csv")
-    with (
-        netCDF4.Dataset(tmp_path / "classic.nc") as old,
-        netCDF4.Dataset(tmp_path / "new.nc", "w") as new,
-    ):
-        for name, dimension in old.dimensions.items():
-            new.createDimension(name, len(dimension))
-        for name, variable in old.variables.items():
-            made = new.createVariable(name, "f8", variable.dimensions, zlib=True)
-            made.units, made[:] = variable.units, variable[:]
-    period = 0.6 if grooves else crossed.PERIODS
-    lines, old, new = (
-        md.read_orders(tmp_path / name, period) for name in ("lines.csv", "classic.nc", "new.nc")
-    )
-    assert old.digest() == new.digest()
-    for order in (0, 1) if grooves else ((0, 0), (1, -1)):
-        shares = [
-            table.efficiency(-math.sin(math.radians(40.0)), 0.0, 550.0, *np.atleast_1d(order))
-            for table in (lines, new)
-        ]
-        assert shares[0] > 0.0
-        # the CSV has seven digits
-        assert shares[1] == pytest.approx(shares[0], rel=1e-6)

@@ -16,7 +16,6 @@ import pytest
 from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.realtime.glsl import bounces
 from mitsuba_diffraction.realtime.glsl.emitters import Emitters, emission
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
@@ -109,22 +108,6 @@ def test_lights_from_emitters_bring_what_the_emitters_bring(some_variant: str) -
         found = irradiance(moved, np.array([0.0, 0.0, 1.0]))
         # noise of Mitsuba's samples, and the colours of its spectra
         assert found == pytest.approx(expected, rel=0.02), part["type"]
-
-
-def test_an_environment_that_is_not_finite_is_refused(some_variant: str) -> None:
-    picture = np.ones((8, 16, 3), np.float32)
-    picture[2, 3] = np.inf
-    scene = {"type": "scene", "sky": {"type": "envmap", "id": "sky", "bitmap": mi.Bitmap(picture)}}
-    with pytest.raises(DiffractionError, match="infinite or NaN"):
-        Emitters(mi.load_dict(scene), np.zeros(3))
-
-
-def test_a_scene_whose_emitters_are_dark_is_refused(some_variant: str) -> None:
-    dark = {"type": "point", "intensity": {"type": "uniform", "value": 0.0}}
-    for parts in ({}, {"dark": dark}):
-        scene = mi.load_dict({"type": "scene", **parts})
-        with pytest.raises(DiffractionError, match="no emitter of the scene lights"):
-            Emitters(scene, np.zeros(3))
 
 
 SIZE = (24, 16)

@@ -8,9 +8,6 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
 import mitsuba_diffraction.thesis.shaders  # noqa: F401 - registers its methods
@@ -23,7 +20,6 @@ from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.methods import METHODS
 from mitsuba_diffraction.realtime.glsl.packing import (
-    WAVENUMBERS,
     pack_boundary,
     pack_colours,
     pack_directions,
@@ -36,9 +32,6 @@ from mitsuba_diffraction.realtime.glsl.source import (
     web_source,
 )
 from mitsuba_diffraction.realtime.glsl.texels import (
-    Packed,
-    as_half,
-    paired,
     shortened,
 )
 from mitsuba_diffraction.tables.colour import ColourTable, colour_difference
@@ -98,18 +91,6 @@ def test_lut_reads_a_colour_table_as_its_numpy_twin_does(
     assert np.percentile(loss, 99) < 0.5
 
 
-@given(arrays.arrays(np.float32, (3, 4), elements=st.floats(-16384, 16384, width=32)))
-def test_two_numbers_lie_in_a_word(values: NDArray[np.float32]) -> None:
-    words = paired(values)
-    assert words.shape == (3, 2)
-    bits = words.view(np.uint32)
-    found = np.stack([bits << 16, bits & np.uint32(0xFFFF0000)], axis=-1).view(np.float32)
-    # a second number of 0 is the least that has an exponent
-    np.testing.assert_allclose(found.reshape(3, 4), shortened(values), rtol=0.0, atol=2e-38)
-    # half a unit of the eighth digit; numbers too small to have eight are off by less than 2⁻¹³⁰
-    np.testing.assert_allclose(shortened(values), values, rtol=2.0**-8, atol=1e-39)
-
-
 @pytest.mark.parametrize(
     ("lit", "bounds"),
     # cut windows 2e-4, lobes averaged at two points to third order: 4e-3 measured
@@ -147,20 +128,6 @@ def test_the_mirror_of_a_small_scan_has_the_light_s_window(gl: Any) -> None:
         found = probed(gl, method, packed | PERFECT, at)
         for part in (slice(0, None, 2), slice(1, None, 2)):
             assert difference(found[part], expected[part]) < bound, method
-
-
-@pytest.mark.parametrize("wavelength", [400.0, 550.0, 700.0])
-def test_light_of_one_wavelength_is_the_table_there(
-    gl: Any, table: DiffractionTable, wavelength: float
-) -> None:
-    at = places(360)
-    k = 2e3 * np.pi / wavelength
-    one = Packed(uniforms={"wavenumber": k}, definitions={"MONOCHROME": ""})
-    found = probed(gl, "exact", pack_powers(table) | one | PERFECT, at)
-    exact = table.window_sum(*(k * at.T[:3])) / (wavelength * 1e-3) ** 2
-    # cut windows
-    assert difference(found[:, 0], exact) < 2e-3
-    np.testing.assert_array_equal(found[:, 0], found[:, 2])
 
 
 def test_amplitudes_serve_exact_as_powers(gl: Any, patch: HeightField) -> None:
@@ -232,12 +199,6 @@ def test_orders_of_one_window_interfere_as_in_the_plugin(gl: Any) -> None:
     assert difference(shaded(gl, make_shader(bsdf, ["fast"]), wi, wo), expected) < 0.003
 
 
-def test_a_coherent_sum_is_refused_by_exact(patch: HeightField) -> None:
-    table = DiffractionTable.build(patch, coherence_width=6.5, coherence="patch")
-    with pytest.raises(DiffractionError, match=r"coherence='patch'.*use method fast"):
-        pack_powers(table)
-
-
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("all_parts", [False, True])
 def test_one_body_compiles_on_the_desktop_and_in_a_browser(
@@ -279,24 +240,3 @@ def test_the_logs_of_other_compilers_are_understood(log: str) -> None:
     parts = [("a.glsl", 10 * "\n"), ("b.glsl", 10 * "\n")]
     words = compiler_words(f"GLSL Compiler failed\n\nfragment_shader\n{log}\n", parts)
     assert words.startswith("b.glsl, line 5: ")
-
-
-def test_an_unknown_method_is_refused_with_the_choices() -> None:
-    with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of fast, exact"):
-        fragment_parts("phong", {})
-
-
-def test_half_floats_are_taken_where_they_hold(table: DiffractionTable) -> None:
-    orders = pack_powers(table).textures[0]
-    assert orders.data.dtype == np.float16
-    for values, held in (([1.0, 0.5], True), ([1.0 + 2.0**-11 * 0.9], False), ([1e5], False)):
-        assert (as_half(np.array(values, np.float32)).dtype == np.float16) == held
-
-
-def test_what_eyes_do_not_see_adds_nothing() -> None:
-    (texture,) = pack_responses(DAYLIGHT).textures
-    assert not texture.data[:, [0, -1]].any()
-    # ∫ s̄ dλ is white: s̄/2π dk · λ²
-    k = np.linspace(*WAVENUMBERS, texture.data.shape[1])
-    white = (texture.data[0, :, :3] * (2 * np.pi / k[:, None]) ** 2).sum(0) * (k[1] - k[0])
-    np.testing.assert_allclose(white, 1.0, atol=1e-3)

@@ -327,16 +327,6 @@ def test_a_lamp_may_reflect_other_light(
         assert found[pixels].mean(axis=0) == pytest.approx(mean, rel=0.02), number
 
 
-def test_a_lamp_is_seen_in_its_colour(gl: Any, some_variant: str, table_file: Path) -> None:
-    """In a picture of a few lights, too."""
-    above = mi.ScalarTransform4f().translate([0.0, 0.0, 0.8]).rotate([1, 0, 0], 90).scale(0.5)
-    glow = {"type": "area", "radiance": {"type": "rgb", "value": [4.0, 3.0, 2.0]}}
-    lamp = {"type": "rectangle", "to_world": above, "bsdf": diffuse(0.0), "emitter": glow}
-    with drawn(gl, plate_scene(table_file, width=64, lamp=lamp), 2) as (renderer, image):
-        for picture in (image, renderer.render(supersampling=1)[..., :3]):
-            assert np.isclose(picture, [4.0, 3.0, 2.0], rtol=0.01).all(axis=-1).sum() > 20
-
-
 def test_what_is_in_focus_stays_where_it_is(some_variant: str) -> None:
     view = np.array(mi.ScalarTransform4f().look_at([1, -4, 3], [0, 0, 0], [0, 0, 1]).matrix, float)
     camera = Camera(view, 40.0, (64, 48), lens=0.3, focus=3.0)

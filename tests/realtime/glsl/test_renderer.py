@@ -13,13 +13,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from mitsuba_diffraction import DiffractionWarning
-from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
-from mitsuba_diffraction.realtime.glsl.export import make_shader
+from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.realtime.shader_comparison.path_traced import direct_light
-from mitsuba_diffraction.reference.fresnel import reflectance
-from tests.realtime.glsl.shaders import shaded
-from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = pytest.mark.thorough
 
@@ -212,36 +208,3 @@ def test_a_sky_over_one_half_lights_what_faces_it(
     assert error.max() < 0.06
     assert traced[ball, 2].max() > 2.0 * traced[ball, 2].min()
     made.release()
-
-
-#: Directions towards the eye and the light in a plate's frame.
-VIEW, SUN = np.array([0.0, -0.6, 0.8]), np.array([-0.6, 0.64, 0.48])
-
-
-def test_what_lies_beneath_gets_the_light_that_the_table_leaves(
-    gl: Any, table_file: Path, some_variant: str
-) -> None:
-    white = {"type": "diffuse", "reflectance": 1.0}
-    skin = {"type": "diffraction", "filename": str(table_file), "int_ior": 2.5, "orientation": 25.0}
-    plate = mi.load_dict({**skin, "nested": white})
-    parameters = mi.traverse(plate)
-    parameters["height_scale"] = 1.25
-    parameters.update()
-    shader = make_shader(plate, ["exact"])
-    found = shaded(gl, shader, VIEW[None], SUN[None], "diffraction_transmission")[0]
-    # half floats, and interpolation between pages of height scales
-    np.testing.assert_allclose(found, beneath(plate, SUN), rtol=2e-3)
-    flat = np.prod([1.0 - reflectance(cos, 2.5 / 1.000277) for cos in (SUN[2], VIEW[2])])
-    assert np.abs(found / flat - 1.0).min() > 4e-3
-
-
-def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Share that reaches a white base by the plugin, over all wavelengths of daylight."""
-    lam = np.arange(380.0, 740.0, 5.0)
-    si = interaction(np.broadcast_to(VIEW, (len(lam), 3)), lam)
-    everywhere = vectors(np.broadcast_to(wo, (len(lam), 3)))
-    of_nested = mi.BSDFContext()
-    of_nested.component = 1
-    found = spectra(plate.eval(of_nested, si, everywhere))[:, 0]
-    weights = linear_srgb(response(lam))
-    return np.asarray(found @ (weights / weights.sum(axis=0))) * np.pi / wo[2]

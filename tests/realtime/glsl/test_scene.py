@@ -6,9 +6,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, bsdf_dict, gratings
+from mitsuba_diffraction import DiffractionTable, bsdf_dict, gratings
 from mitsuba_diffraction.realtime.glsl.packed_scene import PackedScene
-from mitsuba_diffraction.realtime.glsl.scene import read_scene, triangles_of, winding_of
+from mitsuba_diffraction.realtime.glsl.scene import triangles_of, winding_of
 from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
 
 
@@ -66,18 +66,6 @@ def test_a_ball_and_a_plate_are_as_far_away_as_they_are(some_variant: str) -> No
     assert np.abs(found - expected)[near].max() < 0.5 * 3**0.5 + 0.25
 
 
-def test_no_ray_slips_through_a_large_triangle(some_variant: str) -> None:
-    """Every cell along a line across it is at most a cell from an occupied one."""
-    packed = pack_obstacles(np.array([[[0.0, 0, 0], [1, 0, 0.3], [0.2, 1, 0.7]]]))
-    low, cell, size = (packed.uniforms[f"obstacles_{n}"] for n in ("low", "cell", "size"))
-    texels = packed.textures[0].data.ravel()[: np.prod(size)].reshape(size[::-1])
-    weights = np.random.default_rng(0).dirichlet(np.ones(3), 20000)
-    inside = weights @ [[0.0, 0, 0], [1, 0, 0.3], [0.2, 1, 0.7]]
-    x, y, z = ((inside - low) / cell).astype(int).T
-    assert (texels[z, y, x] == 0).mean() > 0.9
-    assert texels[z, y, x].max() <= 4 * 3**0.5
-
-
 def test_relief_ends_where_a_table_does(some_variant: str) -> None:
     """Beyond it powers would be those at its end, and scales of energy extrapolated."""
     field = gratings.sinusoidal(1.6, 0.05, periods=2)
@@ -87,18 +75,3 @@ def test_relief_ends_where_a_table_does(some_variant: str) -> None:
         surface = bsdf_dict(table, energy_conserving=False)
         scene = {"type": "scene", "disk": {"type": "disk", "bsdf": surface}, "sensor": sensor}
         assert PackedScene(mi.load_dict(scene), 0, (-1.0, 0.0, 0.5)).octaves == octaves
-
-
-def test_attributes_that_are_missing_and_places_are_refused(some_variant: str) -> None:
-    props = mi.Properties()
-    turn = {"type": "mesh_attribute", "name": "vertex_orientation"}
-    props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": turn})
-    placed = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}
-    disk = {"type": "disk", "bsdf": bsdf_dict(gratings.sinusoidal(1.6, 0.05, periods=2), **placed)}
-    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
-    for shape, words in (
-        (mi.Mesh("plate", 3, 1, props=props), "no attribute vertex_orientation"),
-        (disk, "coherence='surface'"),
-    ):
-        with pytest.raises(DiffractionError, match=words):
-            read_scene(mi.load_dict({"type": "scene", "shape": shape, "sensor": sensor}))

@@ -20,7 +20,7 @@ from mitsuba_diffraction.realtime.glsl.maps import axis_map
 from mitsuba_diffraction.realtime.glsl.shader_materials import ShaderMaterial, pack_surface
 from mitsuba_diffraction.realtime.glsl.source import display_definitions, joined, source_parts
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
-from tests.realtime.glsl.shaders import PERFECT, difference, drawn, paired, probed, shaded
+from tests.realtime.glsl.shaders import difference, drawn, paired, probed, shaded
 from tests.support.descriptions import CHANGES, ELSEWHERE, base
 from tests.support.directions import polar
 from tests.support.kinds import COATED, SLOPE
@@ -71,31 +71,6 @@ def test_scaled_light_vanishes_at_the_horizon(
         assert_allclose(found, expected, rtol=0.02)
         factors.append(found)
     assert factors[2] < 0.1 < 0.7 < factors[0]
-
-
-def test_gloss_is_mitsuba_s_and_a_base_burley_s(gl: Any) -> None:
-    mi.set_variant("scalar_spectral_polarized")
-    alpha, roughness = 0.3, 0.55
-    facets = {"type": "roughconductor", "material": "none", "distribution": "beckmann"}
-    facets = mi.load_dict(facets | {"alpha": alpha})
-    wi, wo, _ = (part[60:120:3] for part in pairs())
-    value = "vec4((base_colour = vec3(0.5), gloss(wi, wo).r), burley(wi, wo), 0.0, 1.0)"
-    parts = PERFECT | paired(wi, wo) | Packed(
-        uniforms={"gloss_alpha": alpha, "roughness": roughness, "metallic": 0.0},
-        definitions={"GLOSS": "", "PRINCIPLED": "", "VALUE": value},
-    )  # fmt: skip
-    found = probed(gl, "fast", parts, np.zeros((len(wi), 4)))
-    seen = [
-        np.ravel(mi.unpolarized_spectrum(facets.eval(mi.BSDFContext(), interaction(i, 550.0), o)))
-        for i, o in zip(wi, map(vectors, wo), strict=True)
-    ]
-    assert_allclose(found[:, 0], np.array(seen)[:, 0], rtol=1e-4, atol=1e-6)
-    # Burley 2012, section 5.3: F_D90 = 1/2 + 2 r cos²θd
-    fifth = (1.0 - wi[:, 2]) ** 5, (1.0 - wo[:, 2]) ** 5
-    thrown = 2.0 * roughness * 0.5 * (1.0 + (wi * wo).sum(axis=1))
-    lost = (1.0 - 0.5 * fifth[0]) * (1.0 - 0.5 * fifth[1])
-    back = thrown * (fifth[0] + fifth[1] + fifth[0] * fifth[1] * (thrown - 1.0))
-    assert_allclose(found[:, 1], lost + back, rtol=1e-4)
 
 
 def packed_of(described: Surface) -> object:

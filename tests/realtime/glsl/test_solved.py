@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 import mitsuba_diffraction.thesis.shaders  # registers its methods
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.orders import OrderTable
-from mitsuba_diffraction.realtime.glsl.diffracting import pack_table
 from mitsuba_diffraction.realtime.glsl.export import make_shader
 from mitsuba_diffraction.realtime.glsl.lobes import pack_lobes
 from mitsuba_diffraction.realtime.glsl.packing import pack_responses
@@ -111,16 +109,3 @@ def test_the_exported_shader_has_the_same_colours(
         beneath = (1.0 - reflected[0]) * (1.0 - reflected[1])
         passed = shaded(gl, shader, wi, wo, "diffraction_transmission")
         np.testing.assert_allclose(passed, beneath, atol=2e-3)  # half floats, linear cells
-
-
-def test_sheets_are_refused_in_one_line(some_variant: str) -> None:
-    sheet = load(thin_grating(period=0.5, reflectance=0.3, thin=True))
-    with pytest.raises(
-        DiffractionError, match="light that goes through, which an exported shader cannot"
-    ):
-        make_shader(sheet)
-
-
-def test_methods_of_the_thesis_refuse_solved_orders(table: OrderTable, some_variant: str) -> None:
-    with pytest.raises(DiffractionError, match=r"solved orders.*use method fast"):
-        pack_table(load(table).describe(), "flss")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import io
 import mimetypes
-import re
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -19,10 +18,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.glsl.export import export_shader, make_shader
-from mitsuba_diffraction.realtime.web.export import make_page
 from tests.support.browser import PATIENCE
 from tests.support.pictures import by_methods
 
@@ -280,33 +277,3 @@ def test_every_surface_is_valid_glsl_of_its_own(
     # what the shader reads is what the constants give, or what the page declared
     given = set(shader.uniforms) | {texture.name for texture in shader.textures}
     assert set(names) - {"energy", "eta"} <= given
-    material = Path(md.__file__).parent / "realtime/glsl/three/diffraction.js"
-    whole = shader.code + material.read_text(encoding="utf-8")
-    code = re.sub(r"\s*//.*", "", whole)  # comments cost a program nothing
-    # formulas under coats are 20 kB, and conditionals of other features are the driver's to skip
-    assert len(code.encode()) < 60_000
-
-
-FILMED = md.bsdf_dict(GRATING, coherence_width=6, int_ior=1.5, film_ior=1.8, film_thickness=90)
-
-
-@pytest.mark.parametrize(
-    ("surface", "methods", "words"),
-    [
-        *((None, methods, "choose from fast, exact") for methods in (["flss"], [], ["fast"] * 2)),
-        (FILMED, ["fast"], "an exported shader cannot show"),
-        ({"type": "diffuse"}, ["fast"], "does not diffract"),
-    ],
-    ids=["unknown", "none", "twice", "film", "diffuse"],
-)
-def test_what_shaders_do_not_know_is_refused(
-    scene: Any, surface: dict[str, Any] | None, methods: list[str], words: str
-) -> None:
-    import mitsuba as mi
-
-    bsdf = scene.shapes()[0].bsdf() if surface is None else mi.load_dict(surface)
-    with pytest.raises(DiffractionError, match=words):
-        make_shader(bsdf, methods)
-    if surface is None:
-        with pytest.raises(DiffractionError, match=words):
-            make_page(scene, methods=methods)

@@ -146,32 +146,6 @@ def test_triangles_get_fewer_for_good_where_pictures_are_slow(opened: Tab) -> No
     assert details == [0, 2, 1]
 
 
-def test_the_shadows_of_a_light_that_stands_still_are_drawn_once(opened: Tab) -> None:
-    with clock_stopped(opened.page):
-        maps, moved = opened.page.evaluate(
-            """async () => {
-            const map = viewer.drawing.shadows.coarse, { use } = map.program;
-            let drawn = 0;
-            map.key = undefined;
-            viewer.adapt = () => {};  // more triangles would need another map
-            map.program.use = () => (++drawn, use.apply(map.program));
-            const frame = async (change) => {
-                change();
-                viewer.touch();
-                await new Promise(requestAnimationFrame);
-            };
-            for (let n = 0; n < 4; ++n) await frame(() => viewer.camera.orbit(0.01, 0));
-            const still = drawn;
-            for (let n = 0; n < 4; ++n) await frame(() => viewer.lights.move(0.01, 0));
-            delete map.program.use;
-            delete viewer.adapt;
-            return [still, drawn - still];
-        }"""
-        )
-    assert maps == 1
-    assert moved >= 3  # a frame may still be under way
-
-
 def test_at_rest_nothing_is_drawn(opened: Tab) -> None:
     drawn = opened.page.evaluate(
         """async () => {

@@ -90,44 +90,37 @@ def test_sliders_change_the_picture(opened: Tab) -> None:
     assert opened.page.inner_text("#exposure_value") == "+1.0 EV"
 
 
+WITHOUT = """const all = WebGL2RenderingContext.prototype.{0};
+    WebGL2RenderingContext.prototype.{0} = function (name) {{
+        return name === {1} ? {2} : all.call(this, name);
+    }}"""
+
+
 @pytest.mark.parametrize(
     ("script", "words"),
     [
         ("HTMLCanvasElement.prototype.getContext = () => null", "has no WebGL 2"),
         ("WebGL2RenderingContext.prototype.getExtension = () => null", "EXT_color_buffer_float"),
         ("delete window.DecompressionStream", "cannot unpack"),
-        (
-            """const all = WebGL2RenderingContext.prototype.getParameter;
-            WebGL2RenderingContext.prototype.getParameter = function (name) {
-                return name === this.MAX_TEXTURE_SIZE ? 64 : all.call(this, name);
-            }""",
-            "this device supports 64",
-        ),
+        (WITHOUT.format("getParameter", "this.MAX_TEXTURE_SIZE", "64"), "this device supports 64"),
+        # as if half floats could not hold the ground's map
+        (WITHOUT.format("getExtension", '"OES_texture_float_linear"', "null"),
+         "linear filtering of float textures"),
     ],
-)
+)  # fmt: skip
 def test_browsers_that_lack_something_are_told_so(
-    page_file: Path, tab: Any, script: str, words: str
+    page: Page, tab: Any, tmp_path: Path, script: str, words: str
 ) -> None:
-    opened = tab(script=script)
-    assert opened.open(page_file) == "failed"
+    path, opened = tmp_path / "page.html", tab(script=script)
+    text = (
+        page.text.replace('"kind": "picture"', '"kind": "single"')
+        if "linear" in words
+        else page.text
+    )
+    path.write_text(text, encoding="utf-8")
+    assert opened.open(path) == "failed"
     assert words in opened.page.inner_text("#message")
     assert opened.said == []
-
-
-def test_maps_in_single_precision_need_linear_filtering(
-    page: Page, tab: Any, tmp_path: Path
-) -> None:
-    # as if half floats could not hold the ground's map
-    text = page.text.replace('"kind": "picture"', '"kind": "single"')
-    path = tmp_path / "single.html"
-    path.write_text(text, encoding="utf-8")
-    lacking = """const all = WebGL2RenderingContext.prototype.getExtension;
-        WebGL2RenderingContext.prototype.getExtension = function (name) {
-            return name === "OES_texture_float_linear" ? null : all.call(this, name);
-        }"""
-    opened = tab(script=lacking)
-    assert opened.open(path) == "failed"
-    assert "linear filtering of float textures" in opened.page.inner_text("#message")
 
 
 def test_a_notebook_shows_the_same_page(

@@ -13,14 +13,11 @@ from hypothesis.extra.numpy import arrays
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.orientation.directions import GUIDES, direction_field
 from mitsuba_diffraction.scene.orientation.mesh_files import write_ply
-from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import (
-    TriangleMesh,
     oriented_mesh,
     vertex_normals,
 )
-from scenes.make import disc, piece
-from scenes.make.scales import Scales
+from scenes.make import disc
 from tests.support.meshes import Arrays, ball, ring, wrapped
 
 
@@ -146,24 +143,6 @@ def test_any_triangles_get_a_finite_field_or_are_refused(faces, seed, along, own
     assert np.isfinite(mesh.orientation).all()
 
 
-def test_bad_requests_are_one_line() -> None:
-    with pytest.raises(DiffractionError, match="along='w' is unknown; choose one of smooth, x"):
-        direction_field(*ball(), "w")
-    with pytest.raises(DiffractionError, match="smoothing = nan is outside"):
-        direction_field(*ball(), "x", smoothing=float("nan"))
-    flat = np.zeros((3, 3)), np.ones((3, 3)), np.array([[0, 1, 2]])
-    with pytest.raises(DiffractionError, match="no triangle has an area"):
-        direction_field(*flat)
-    positions, normals, faces = ball()
-    positions[7] = np.inf
-    with pytest.raises(DiffractionError, match="vertex 7 is not finite"):
-        direction_field(positions, normals, faces)
-    with pytest.raises(DiffractionError, match="disc: inner = 3 is outside"):
-        disc(3.0, 2.0)
-    with pytest.raises(DiffractionError, match="piece: rows = 99 is outside 3 to 17"):
-        piece(rows=99)
-
-
 @pytest.mark.parametrize("inner", [0.0, 2.0])
 def test_a_disc_has_its_area_and_faces_up(inner: float) -> None:
     mesh = disc(inner, 5.0, sectors=360)
@@ -172,16 +151,3 @@ def test_a_disc_has_its_area_and_faces_up(inner: float) -> None:
     assert up.min() > 0
     # a polygon of 360 corners lacks 5e-5 of the circle
     assert up.sum() == pytest.approx(np.pi * (25 - inner**2), rel=1e-4)
-
-
-def test_a_piece_is_the_back_of_a_snake() -> None:
-    mesh: TriangleMesh = piece(scales=Scales(detail=2, turn=-90.0), columns=4, rows=7)
-    assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1)
-    assert mesh.normals[:, 2].mean() > 0.8
-    report = check_tangents(mesh)
-    assert report.usable
-    pitch = 2 * 0.74 / 18 * 1.25  # circumferences
-    # the cells that the cut goes through, of 1.22 / 4 pitches, are left out at both ends
-    assert 4 * pitch - 2 * 1.22 / 4 * pitch < np.ptp(mesh.uv[:, 0]) <= 4 * pitch + 1e-9
-    assert mesh.orientation is not None
-    np.testing.assert_allclose(mesh.orientation, np.tile([0, -1], (len(mesh.uv), 1)), atol=1e-12)

@@ -90,15 +90,6 @@ def test_ply_meshes_are_read_as_mitsuba_reads_them(
         check_mesh(file, "ply")
 
 
-def test_an_element_without_properties_is_refused(tmp_path: Path) -> None:
-    """Mitsuba would count to its number."""
-    file = tmp_path / "mesh.ply"
-    content = ply(FACES, "ascii", "int", False)
-    file.write_bytes(content.replace(b"element face", b"element none 9999999999\nelement face"))
-    with pytest.raises(DiffractionError, match="no properties"):
-        check_mesh(file, "ply")
-
-
 @pytest.mark.parametrize("left", [20, 100, 140])
 def test_a_header_without_an_end_is_refused(left: int, tmp_path: Path) -> None:
     """Mitsuba reads on beyond the end of the file, which ends the process."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -11,24 +9,18 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights import Source
-from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.optics.colour import linear_srgb
 from mitsuba_diffraction.scene.planning.light import (
     BINS,
     WAVELENGTHS,
     light_of_tables,
 )
 from mitsuba_diffraction.scene.planning.plan import (
-    frequency_limit,
     load_by_recipes,
-    load_limited,
-    outside,
     plan_table,
-    quantiles,
     recipe_files,
     recipe_of,
 )
-from mitsuba_diffraction.scene.planning.report import wavelengths_needed
-from mitsuba_diffraction.tables import TableRequest
 from tests.support.directions import polar, rough_patch
 
 pytestmark = pytest.mark.thorough
@@ -87,12 +79,6 @@ def file(tmp_path_factory):
 def variant():
     """Other modules set others."""
     mi.set_variant("llvm_ad_spectral")
-
-
-def light_by_hand(lit, frequency):
-    """Light of the plate's table at these frequencies, which is all there is."""
-    total = float(frequency.sum())
-    return dataclasses.replace(lit, frequency=frequency, total=total)
 
 
 def from_file(file, **parameters):
@@ -193,50 +179,6 @@ def test_several_surfaces_have_light_of_their_own():
     for each in (first, second):
         assert each.share == pytest.approx(1.0, abs=1e-3)
     assert first.total > 2.0 * second.total
-
-
-def test_the_limit_is_a_quantile_of_the_light(lit):
-    frequency = np.zeros((BINS, BINS))
-    frequency[0] = 1.0 / BINS
-    light, end = light_by_hand(lit, frequency), lit.table.q_limit
-    along_x, along_y = frequency_limit(light, 0.1)
-    # 2 % of room are added
-    assert along_x == pytest.approx(1.02 * 0.90 * end, abs=2.0 * end / BINS)
-    # all of it lies on one axis
-    assert along_y <= along_x / 7
-    assert outside(light, (along_x, along_y)) <= 0.1
-    assert frequency_limit(light, 1e-4)[0] == end
-    assert quantiles(np.arange(1000), np.ones(1000), [0.5]) == pytest.approx([500], abs=2)
-
-
-def test_wavelengths_that_the_eye_does_not_see_cost_no_colour():
-    needed = wavelengths_needed(response(0.5 * (WAVELENGTHS[1:] + WAVELENGTHS[:-1])).sum(axis=1))
-    low, high = needed["range_nm"]
-    assert 380.0 < low < 410.0
-    assert 680.0 < high < 720.0
-    assert needed["lost_colour"] < 0.5  # half of what an eye can just tell apart
-
-
-def test_where_all_of_a_table_is_asked_for_it_stays_whole(lit):
-    class Unused(TableRequest):
-        def cached(self, settings):
-            raise AssertionError("a table is built")
-
-    asked = lit.request
-    request = Unused(*(getattr(asked, each.name) for each in dataclasses.fields(asked)))
-    full = dataclasses.replace(light_by_hand(lit, np.ones((BINS, BINS))), request=request)
-    assert plan_table(full, 1e-3).settings is None
-    unseen = light_by_hand(full, np.zeros((BINS, BINS)))
-    assert plan_table(unseen, 1e-3).table is lit.table
-
-
-def test_a_scene_is_loaded_with_the_limits_of_its_plan(lit):
-    planned = plan_table(lit, 1e-3)
-    (table,) = tables_of(load_limited(plate, [planned]))
-    assert table is planned.table
-    # one of other settings is none of the plan's
-    (other,) = tables_of(load_limited(lambda: plate(tolerance=1e-2), [planned]))
-    assert not other.limited
 
 
 @pytest.mark.parametrize("coherence", ["ensemble", "patch"])

@@ -94,3 +94,10 @@ def test_grooves_shadow_at_grazing_angles_only():
     assert shadowed.factor(wi, up) == open_.factor(wi, up)
     grazing = polar(85.0)[None]
     assert shadowed.factor(wi, grazing) < 0.5 * open_.factor(wi, grazing)
+
+
+def test_light_from_below_is_none(rough, of_rough):
+    wi, wo = polar(30.0), polar(120.0)
+    for method in of_rough.values():
+        assert method.brdf(wi, wo, 550.0) == 0.0
+        assert np.all(method.xyz([wi, wo], [wo, wi]) == 0.0)
