@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import field as field_module
@@ -30,11 +28,6 @@ def test_heights_are_copied_and_read_only():
         field.heights[0, 0] = 1
 
 
-def test_attributes_cannot_be_rebound():
-    with pytest.raises(AttributeError):
-        HeightField(FLAT, 1).pixel_size = (2.0, 2.0)  # type: ignore[misc]
-
-
 @pytest.mark.parametrize(
     ("given", "expected"),
     [
@@ -52,26 +45,15 @@ def test_pixel_size_takes_numbers_pairs_and_strings(given, expected):
     assert HeightField(FLAT, given).pixel_size == expected
 
 
-def test_extent_is_the_period_of_the_tiling():
-    field = HeightField(FLAT, (0.5, 0.25))
-    assert field.shape == (3, 4)
-    assert field.extent == (2.0, 0.75)
-
-
 def test_statistics_of_a_plane():
     y, x = np.mgrid[0:40, 0:30]
     field = HeightField(0.2 * x * 0.5 + 0.1 * y * 0.25, (0.5, 0.25))
+    assert field.shape == (40, 30)
+    assert field.extent == (15.0, 10.0)
     # exact differences of an exact plane: rounding only
     assert field.rms_slope == pytest.approx(math.hypot(0.2, 0.1), rel=1e-12)
     assert field.range == pytest.approx(0.2 * 0.5 * 29 + 0.1 * 0.25 * 39, rel=1e-12)
     assert field.rms_height == pytest.approx(field.heights.std(), rel=1e-12)
-
-
-def test_rms_slope_of_a_sinusoid():
-    x = np.arange(256) / 256
-    field = HeightField(np.tile(0.05 * np.cos(2 * np.pi * x), (4, 1)), 2.5 / 256)
-    # differences of 256 samples a period lose 2.5e-5 of the slope, one sample of 256 is left out
-    assert field.rms_slope == pytest.approx(math.pi * 0.1 / (math.sqrt(2) * 2.5), rel=5e-3)
 
 
 def test_equal_content_has_equal_digest():
@@ -81,14 +63,6 @@ def test_equal_content_has_equal_digest():
     assert field.digest() != HeightField(heights, 0.2).digest()
     assert field.digest() != HeightField(heights.reshape(6, 5), 0.1).digest()
     assert field.digest() != HeightField(heights + 1e-9, 0.1).digest()
-
-
-def test_summary_is_plain_data():
-    import json
-
-    field = HeightField(FLAT, 0.1, name="flat", history=["filled"])
-    assert json.loads(json.dumps(field.summary())) == field.summary()
-    assert field.summary()["history"] == ["filled"]
 
 
 def test_gentle_well_sampled_patch_is_valid():
@@ -162,17 +136,6 @@ def test_unusable_pixel_sizes_are_refused(pixel_size):
     with pytest.raises(DiffractionError, match="pixel_size") as caught:
         HeightField(FLAT, pixel_size)
     assert "\n" not in str(caught.value)
-
-
-@given(st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(), st.binary(),
-                 st.complex_numbers(), st.lists(st.floats(), max_size=4)))  # fmt: skip
-def test_any_pixel_size_works_or_is_one_clear_line(value):
-    try:
-        field = HeightField(FLAT, value)
-    except DiffractionError as error:
-        assert "\n" not in str(error)
-    else:
-        assert min(field.pixel_size) > 0
 
 
 def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -12,8 +11,6 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning, HeightField
 from mitsuba_diffraction.heights.read import LoadOptions
-from mitsuba_diffraction.heights.source import notes_line
-from mitsuba_diffraction.settings import TableSettings
 from tests.support.refusals import refusal
 
 HEIGHTS = np.random.default_rng(3).normal(size=(6, 5))
@@ -99,20 +96,6 @@ def test_a_constant_offset_does_not_matter(tmp_path, offset):
     assert f"a constant offset of {offset + HEIGHTS.mean():.6g} µm was subtracted" in far.history
     with pytest.raises(DiffractionError, match=r"span 2e\+04"):
         HeightField(HEIGHTS * 0 + np.linspace(offset, offset + 2e4, 5), 0.1)
-
-
-def test_notes_name_their_command_and_say_in_full_that_colours_are_not_reliable():
-    settings, file = TableSettings(), Path("folder/scan.txt")
-    gentle = ["scan: expect colours to differ"]
-    steep = [*gentle, "scan: do not rely on its colours: RMS slope 2.1"]
-    line = notes_line(gentle, file, LoadOptions(), settings)
-    assert "1 note" in line
-    assert "mitsuba-diffraction info folder/scan.txt" in line
-    assert gentle[0] not in line
-    line = notes_line(steep, file, LoadOptions(), settings)
-    assert line.startswith(steep[1])
-    assert gentle[0] not in line
-    assert "\n" not in line
 
 
 def questions(field):
