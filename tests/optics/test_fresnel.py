@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics.fresnel import Filmed
-from mitsuba_diffraction.reference import fresnel, model
+from mitsuba_diffraction.reference import fresnel
 from tests.support.matrices import MATRICES, pairs
 
 COSINES = np.cos(np.radians([0.0, 20.0, 45.0, 70.0, 89.0]))
 MATERIALS = (1.5, 0.8, 0.65 + 5.6j)
 FILMS = (1.45, 0.7, 2.4 + 0.1j)
 DEPTHS = np.random.default_rng(4).uniform(0.1, 6.0, 300)
-
-
-def test_a_perfect_conductor_reflects_everything():
-    assert np.all(fresnel.reflectance(COSINES, np.inf) == 1.0)
 
 
 def test_it_is_what_mitsuba_computes(some_variant):
@@ -54,10 +50,3 @@ def test_no_film_reflects_more_than_it_gets():
     for index in MATERIALS:
         for film in FILMS:
             assert fresnel.reflectance(cosines, Filmed(index, film, DEPTHS)).max() <= 1.0 + 1e-12
-
-
-def test_elements_are_those_of_all_parts():
-    one = Filmed(np.array([1.5, 1.6]), 1.4, np.array([2.0, 3.0]))[1]
-    wi, wo = (a[:1] for a in pairs())
-    found = model.small_slope(wi, wo, one)
-    assert found == pytest.approx(model.small_slope(wi, wo, Filmed(1.6, 1.4, 3.0)))
