@@ -90,13 +90,6 @@ def test_what_is_no_table(tmp_path, name, message):
     assert message.format(tmp_path / name) in refused(tmp_path / name)
 
 
-@pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.9, 0.999])
-def test_a_truncated_table(saved, share):
-    content = saved.read_bytes()
-    saved.write_bytes(content[: int(share * len(content))])
-    refused(saved)
-
-
 @pytest.mark.parametrize("version", [1, 2, None, "3"])
 def test_a_table_of_another_version(saved, version):
     contents = Contents(saved)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
-from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import rough_patch
 
 #: 19.2 µm wide; Nyquist's frequency is 10.5 rad/µm.
@@ -65,15 +64,6 @@ def test_beyond_the_limit_it_is_dark_and_never_guessed(limited):
 def test_it_takes_less_memory(whole, limited):
     components = limited.coefficients.shape[3]
     assert limited.nbytes < 0.5 * components * whole.nbytes
-
-
-def test_rgb_colours_need_all_orders(limited):
-    with pytest.raises(DiffractionError, match="ends at the frequencies 8 along x and 3 rad/µm"):
-        ColourTable.build(limited)
-
-
-def test_the_summary_says_where_it_ends(limited):
-    assert limited.summary()["frequency_limit"] == list(LIMIT)
 
 
 @pytest.mark.parametrize("limit", [-1.0, (1.0, 0.0), float("nan"), (1.0, 2.0, 3.0), "none"])

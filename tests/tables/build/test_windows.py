@@ -7,8 +7,8 @@ import pickle
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
-from mitsuba_diffraction.heights.coherence import LOOKUP, resolved, window_corners
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
+from mitsuba_diffraction.heights.coherence import LOOKUP, resolved
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build import powers as powers_module
@@ -57,17 +57,6 @@ def test_a_grating_s_order_is_where_its_equation_says_however_many_periods_the_s
     assert width == pytest.approx(expected, rel=0.15)
 
 
-def test_powers_of_all_orders_add_up_to_1():
-    patches = Screens([sinusoid(10.5, 20.0)], 10.0)
-    ny, nx = patches.tile
-    for kappa in (1e-3, 0.3, 12.0, 40.0):
-        powers = np.abs(patches.spectrum(0, (nx // 2, ny // 2), double=True).of_phase(kappa)) ** 2
-        assert np.sum(powers) == pytest.approx(1.0, abs=1e-9)
-        powers[ny // 2, nx // 2] = 0.0
-        # but for the curvature about order 0, whose own bin has no power of other orders
-        assert np.sum(patches.sharpened(powers)) == pytest.approx(powers.sum(), rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("side", "light", "window", "count"),
     [
@@ -82,14 +71,6 @@ def test_the_width_of_windows_follows_the_scan_and_the_light(side, light, window
     assert settings.width == pytest.approx(window)
     assert settings.lookup_width == pytest.approx(LOOKUP * window)
     assert len(screens_of([field], settings)) == count
-
-
-def test_a_scan_that_is_not_square_has_windows_along_its_longer_side():
-    field = HeightField(rough(120)[:60], PIXEL, cut_out=True)
-    table = DiffractionTable.build(field, **{**SETTINGS, "coherence_width": 65.0})
-    assert table.window_width == pytest.approx(6.0)
-    assert table.source["windows"]["along x, y"] == [(3, 1)]
-    assert table.source["windows"]["extent"] == pytest.approx([6.0, 6.0])
 
 
 def test_windows_agree_with_the_whole_scan_within_their_standard_error(scan, table):
@@ -121,64 +102,11 @@ def test_several_windows_are_levelled_each_and_a_single_one_is_as_it_is():
     np.testing.assert_array_equal(alone.heights, waved.heights)
 
 
-@pytest.mark.parametrize("count", [2, 7])
-def test_the_mean_over_noise_scatters_as_welch_has_it(count):
-    length = 64
-    windows = Screens([HeightField(rough(length * (count + 1) // 2), 1.0, cut_out=True)], 64.0)
-    rng = np.random.default_rng(2)
-    ny, nx = windows.scans[0].shape
-    corners = [(top, left) for _, top, left in windows._places]
-    taper, draws = windows.taper, []
-    for _ in range(300):
-        noise = rng.standard_normal((ny, nx)) + 1j * rng.standard_normal((ny, nx))
-        parts = [taper * noise[y : y + length, x : x + length] for y, x in corners]
-        powers = np.abs([np.fft.fft2(part)[5:25:4, 5:25:4] for part in parts]) ** 2
-        draws.append((powers.mean(axis=0), powers[0]))
-    mean, first = np.moveaxis(np.array(draws), 1, 0)
-    # 300 draws of 25 bins: the ratio of two variances scatters by 3 %
-    ratio = mean.var(axis=0).mean() / first.var(axis=0).mean()
-    assert ratio == pytest.approx(windows.variance_factor, rel=0.15)
-
-
-def test_windows_of_a_large_grid_are_those_of_one_colour_of_a_chessboard():
-    assert window_corners([0], [0, 5, 9]) == [(0, 0), (0, 5), (0, 9)]
-    assert window_corners([0, 4], [0, 4]) == [(0, 0), (0, 4), (4, 0), (4, 4)]
-    assert window_corners([0, 4, 8], [0, 4, 8]) == [(0, 0), (0, 8), (4, 4), (8, 0), (8, 8)]
-
-
-def test_memory_is_of_one_window_for_each_thread(monkeypatch):
-    scan = HeightField(rough(240), PIXEL, cut_out=True)
-    alive = []
-    made = Screens.__getitem__
-
-    def counted(self, n):
-        result = made(self, n)
-        alive.append(result.heights.size)
-        return result
-
-    monkeypatch.setattr(Screens, "__getitem__", counted)
-    found = DiffractionTable.build(scan, windows=8.0, **{**SETTINGS, "coherence_width": 65.0})
-    assert found.source["windows"]["number"] == 13
-    assert max(alive) <= 0.25 * scan.heights.size
-
-
 def test_the_table_is_the_same_with_any_number_of_threads(monkeypatch, scan, table):
     monkeypatch.setattr(module.Screens, "batches", lambda self: [self])
     monkeypatch.setattr(powers_module, "_MOST_THREADS", 1)
     again = DiffractionTable.build(scan, **SETTINGS)
     np.testing.assert_array_equal(again.coefficients, table.coefficients)
-
-
-def test_a_grating_narrow_along_one_axis_has_windows_along_the_other():
-    grating = gratings.sinusoidal(period=1.6, depth=0.05, periods=40, pixels_per_period=16, rows=4)
-    table = DiffractionTable.build(grating, windows=6.0, **SETTINGS)
-    (along_x, along_y) = table.source["windows"]["along x, y"][0]
-    assert along_x > 5
-    assert along_y == 1
-    order = 2 * np.pi / 1.6
-    first = table.window_sum(order, 0.0, 12.0)
-    # what is between orders is below the tolerance, 2 %
-    assert first > 50 * table.window_sum(0.5 * order, 0.0, 12.0)
 
 
 def test_several_scans_of_other_sizes_make_one_table():
