@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionTable, HeightField, bsdf_dict, gratings, reference
+from mitsuba_diffraction import DiffractionTable, HeightField, bsdf_dict, reference
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, delta_e, linear_srgb, response
 from mitsuba_diffraction.plugin import materials
 from mitsuba_diffraction.tables.colour import ColourTable
@@ -29,41 +29,23 @@ def lit() -> tuple[Array, Array, Array, Array]:
     return wi, wo, lam, np.random.default_rng(3).random((len(wi), 3))
 
 
-def expected(wi: Array, wo: Array, wavelengths: Array) -> Array:
-    """f·cosθo (N, channels) in the current variant's numbers, without Mitsuba."""
-    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, tolerance=1e-4)
-    if mi.is_rgb:
-        u, v, w = (wi + wo).T
-        colours = ColourTable.build(table).colour(u, v, w)
-        outside = ((1.0 + (wi * wo).sum(axis=1)) / w) ** 2 / wi[:, 2]
-        return 4.0 * np.pi * table.sigma**2 * outside[:, None] * colours
-    columns = [table.brdf(wi, wo, lam) * wo[:, 2] for lam in wavelengths.T]
-    return np.stack(columns if mi.is_spectral else columns[:1], axis=1)
+RGB = [name for name in ALL if "rgb" in name]
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_values_are_those_of_the_table(name: str) -> None:
+@pytest.mark.parametrize("name", RGB)
+def test_colours_are_those_of_the_table(name: str) -> None:
     use(name)
     wi, wo, lam, samples = lit()
-    value = evaluate(load(material="none", wavelength=600.0), wi, wo, samples, lam)[0]
-    truth = expected(wi, wo, lam)
-    if mi.is_rgb:  # colours of a table lack the lobe of order 0 as the horizon sees it
-        far = np.hypot(*(wi + wo)[:, :2].T) > 0.6
-        value, truth = value[far], truth[far]
+    value = evaluate(load(material="none"), wi, wo, samples, lam)[0]
+    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, tolerance=1e-4)
+    u, v, w = (wi + wo).T
+    outside = ((1.0 + (wi * wo).sum(axis=1)) / w) ** 2 / wi[:, 2]
+    colours = ColourTable.build(table).colour(u, v, w)
+    truth = 4.0 * np.pi * table.sigma**2 * outside[:, None] * colours
+    # colours of a table lack the lobe of order 0 as the horizon sees it
+    far = np.hypot(u, v) > 0.6
     # single precision: a phase of some hundred radians across the window has an error of 1e-4
-    assert value == pytest.approx(truth, rel=2e-3, abs=2e-5 * np.abs(truth).max())
-
-
-@pytest.mark.parametrize("name", [name for name in ALL if name.endswith("rgb")])
-def test_colours_of_the_spectrum_are_outside_the_displays_gamut(name: str) -> None:
-    use(name)
-    grating = gratings.blazed(period=2.0, depth=0.25, periods=6, rows=8)
-    x = np.linspace(0.2, 0.35, 8)  # order 1, from 400 to 700 nm
-    wi, wo = np.tile([0.0, 0.0, 1.0], (8, 1)), np.stack([x, 0.0 * x, np.sqrt(1.0 - x**2)], axis=1)
-    bsdf = load(grating, material="none", coherence_width=12.0, tolerance=1e-3)
-    value = evaluate(bsdf, wi, wo, np.full((8, 3), 0.5), np.zeros((8, 4)))[0]
-    # the sRGB red of 500 nm light is −0.36 times its green
-    assert value[:, 0].min() < -0.2 * value[:, 1].max()
+    assert value[far] == pytest.approx(truth[far], rel=2e-3, abs=2e-5 * np.abs(truth).max())
 
 
 def test_in_rgb_a_channel_has_the_boundary_of_one_wavelength() -> None:

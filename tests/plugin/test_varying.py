@@ -1,6 +1,8 @@
-"""Parameters that vary over a surface, and `lateral_scale`: values of the number at each place."""
+"""Parameters that vary over a surface, and `lateral_scale`; what orientations refuse; shadowing."""
 
 from __future__ import annotations
+
+import re
 
 import drjit as dr
 import mitsuba as mi
@@ -8,14 +10,68 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from docs.make.bench.kernels import kernel_operations
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.plugin.description import describe
+from mitsuba_diffraction.plugin.varying import PRECISION
 from tests.support.directions import polar
-from tests.support.furnace import furnace, sinusoid
 from tests.support.gentle import PATCH, UV, WIDTH, directions, hits, load, pairs
-from tests.support.lanes import bitmap, evaluated, interaction, refusal, vectors
+from tests.support.lanes import bitmap, evaluated, refusal, vectors
 
-pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("mono")]
+
+@pytest.mark.parametrize(
+    ("texture", "mend"),
+    [
+        ({"raw": False}, "raw"),
+        ({"channels": 1}, "has three"),
+        ({"levels": 255}, r"save \(1 \+ cos\)/2 .* as EXR"),
+        ({"levels": 65535}, r"save \(1 \+ cos\)/2 .* as EXR"),
+    ],
+)
+def test_a_picture_that_holds_no_directions_is_refused(every_variant, texture, mend):
+    said = refusal(lambda: load(orientation=directions([10.0, 120.0, 200.0, 300.0], **texture)))
+    assert said.startswith("orientation: ")
+    assert re.search(mend, said)
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("degrees", [10.0, 120.0, 200.0, 300.0])
+def test_integers_hold_directions_to_the_stated_precision(some_variant, bits, degrees):
+    levels, angle = 2**bits - 1, np.deg2rad(degrees)
+    doubled = np.array([1.0 + np.cos(angle), 1.0 + np.sin(angle), 1.0]) / 2.0
+    bsdf = load(orientation=bitmap(np.tile(np.rint(doubled * levels) / levels, (2, 2, 1))))
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    cos, sin, _ = (np.ravel(x)[0] for x in describe(bsdf).frame(si))
+    error = np.degrees(np.angle(np.exp(1j * (np.arctan2(sin, cos) - angle))))
+    assert abs(error) < PRECISION[bits] + 2e-5  # the angle in single precision
+    assert f"within {PRECISION[8]:.2g}° in 8 bits" in str(bsdf)
+
+
+def test_the_middle_of_a_picture_of_8_bits_turns_nothing(some_variant):
+    bsdf = load(orientation=bitmap(np.full((2, 2, 3), 128 / 255)))
+    cos, sin, _ = (np.ravel(x)[0] for x in describe(bsdf).frame(dr.zeros(mi.SurfaceInteraction3f)))
+    assert (cos, sin) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("degrees", [1e30, -40_000.0])
+def test_angles_without_digits_are_refused(every_variant, degrees):
+    assert "at least -36000° and at most 36000°" in refusal(lambda: load(orientation=degrees))
+
+
+@pytest.mark.thorough
+def test_vcavity_is_its_formula_and_none_is_the_default(some_variant):
+    wi, wo, lam = pairs(500)
+    plain, shadowed = (
+        evaluated(load(**given), wi, wo, lam[:, None]) for given in ({}, {"shadowing": "vcavity"})
+    )
+    half = (wi + wo) / np.linalg.norm(wi + wo, axis=1, keepdims=True)
+    across = np.sum(wo * half, axis=1)
+    factor = np.minimum(1.0, 2.0 * half[:, 2] * np.minimum(wi[:, 2], wo[:, 2]) / across)
+    assert factor.min() < 0.5  # or the test would say little
+    # order 0 is a mirror's lobe, which grooves do not shadow; of 4.5 µm it reaches 0.5
+    others = np.hypot(*(wi + wo)[:, :2].T) > 0.5
+    expected = (plain * factor[:, None])[others]
+    assert shadowed[others] == pytest.approx(expected, rel=1e-4, abs=1e-6 * float(plain.max()))
+
 
 FACTORS = (0.25, 1.25, 0.8, 0.0)
 #: What conserves energy takes a second for each of the height scales that it is made at.
@@ -43,6 +99,8 @@ def texture(name, numbers):
     return {name: bitmap(texels)}
 
 
+@pytest.mark.thorough
+@pytest.mark.usefixtures("mono")
 @pytest.mark.parametrize("case", CASES)
 def test_each_place_is_as_with_the_number_that_it_has(case):
     varied, fixed = CASES[case]
@@ -64,6 +122,8 @@ def test_each_place_is_as_with_the_number_that_it_has(case):
         assert density == pytest.approx(its, rel=0.05, abs=0.02 * float(its.max()))
 
 
+@pytest.mark.thorough
+@pytest.mark.usefixtures("mono")
 def test_worn_smooth_it_is_a_mirror():
     bsdf = load(**texture("height_scale", FACTORS))
     si = hits(np.array([polar(0.0)]), UV[3])
@@ -71,6 +131,8 @@ def test_worn_smooth_it_is_a_mirror():
     assert aside < 1e-6 * up
 
 
+@pytest.mark.thorough
+@pytest.mark.usefixtures("mono")
 @pytest.mark.parametrize(
     ("name", "channels", "values", "number"),
     [("height_scale", 1, [0.5] * 3, 0.5), ("orientation", 3, [0.0, 1.0, 0.0] * 3, 90.0)],
@@ -96,6 +158,8 @@ def test_a_mesh_attribute_is_read(name, channels, values, number):
         assert found == pytest.approx(constant, rel=0.01)  # two tables of the same orders
 
 
+@pytest.mark.thorough
+@pytest.mark.usefixtures("mono")
 def test_steep_light_within_is_that_of_stretched_heights(mono):
     """Sums of directions reach further than tables do, whatever the factor."""
     factor, rng = 0.65, np.random.default_rng(5)
@@ -119,41 +183,8 @@ def test_steep_light_within_is_that_of_stretched_heights(mono):
     np.testing.assert_allclose(*values, rtol=0.02, atol=2e-3 * values[1].max())
 
 
-def test_energy_is_conserved_at_each_factor_as_by_stretched_heights(mono):
-    """A deep mirror grating, whose albedo is 1.43 by the scales of the unstretched patch."""
-    factors = np.array([[0.8, 1.0]], np.float32)
-    heights = sinusoid()
-    surfaces = [
-        mi.load_dict(md.bsdf_dict(field, material="none", coherence_width=width, **parameters))
-        for field, width, parameters in (
-            (heights, 65.0, {"lateral_scale": 0.8}),
-            (heights, 65.0, {"lateral_scale": bitmap(factors)}),
-            (heights.stretched(0.8), 52.0, {}),
-        )
-    ]
-    # the texture's uv is (0, 0), where the factor is 0.8
-    constant, varying, expected = (
-        furnace(surface, (20.0, 50.0, 75.0, 84.0))[0] for surface in surfaces
-    )
-    for albedo in (constant, varying):
-        assert albedo.max() < 1.03
-        # both scales are linear between wavelengths, of other nodes, on a coarse grid: 0.021; with
-        # the scale of the unstretched patch it is 0.12
-        assert np.abs(albedo - expected).mean() < 0.03
-
-
-def test_without_it_kernels_have_no_operation_for_it(mono):
-    wi, wo, _ = pairs(8)
-    si = interaction(wi, 550.0)
-
-    def operations(**parameters):
-        bsdf = load(**parameters)
-        return kernel_operations(lambda: bsdf.eval_pdf(mi.BSDFContext(), si, vectors(wo)))
-
-    # three multiplications and a scalar that is read, not a second evaluation
-    assert 0 < operations(lateral_scale=1.0) - operations() < 12
-
-
+@pytest.mark.thorough
+@pytest.mark.usefixtures("mono")
 @pytest.mark.parametrize(
     ("loaded", "factor", "largest"),
     [
@@ -176,16 +207,8 @@ def test_numbers_change_up_to_the_largest(mono, loaded, factor, largest):
         parameters.update()
 
 
-def test_tables_serve_no_larger_factors_than_1(mono, tmp_path):
-    path = tmp_path / "patch.exr"
-    md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(path)
-    raw = {"material": "none", "energy_conserving": False}
-    plugin = {"type": "diffraction", "filename": str(path), **raw}
-    mi.load_dict(plugin | {"lateral_scale": 0.9})
-    said = refusal(lambda: mi.load_dict(plugin | {"lateral_scale": 1.1}))
-    assert "give the height field instead of the table" in said
-
-
+@pytest.mark.thorough
+@pytest.mark.usefixtures("mono")
 @pytest.mark.parametrize("factor", [1.1, 1.2, 1.6, 1.7, 2.2])
 def test_numbers_above_1_load(mono, factor):
     """Their double is below their single precision, or above it."""

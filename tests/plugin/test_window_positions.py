@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from docs.make.bench.kernels import kernel_operations
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
 from tests.support.directions import lit_pairs, uniform_directions
 from tests.support.gentle import PATCH, WIDTH, hits, load
-from tests.support.lanes import interaction, refusal, spectra, vectors
+from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = pytest.mark.thorough
 
@@ -124,34 +122,3 @@ def test_directions_and_albedo_are_those_of_the_mean(mono):
     assert one == pytest.approx(other, rel=0.02, abs=1e-3 * float(other.max()))
     one, other = (bsdf.describe().albedo_excess(1.0).values for bsdf in both)
     assert one == pytest.approx(other, rel=2e-3, abs=1e-4)
-
-
-def test_kernels_of_other_coherences_know_no_places(mono):
-    wi, wo, _, _ = lit_pairs(PATCH, sigma_of(WIDTH), 60, 3)
-
-    def operations(bsdf, si):
-        return kernel_operations(lambda: bsdf.eval(mi.BSDFContext(), si, vectors(wo)))
-
-    anywhere, nowhere = hits(wi, places(60)), hits(wi, places(60))
-    nowhere.uv = dr.zeros(mi.Point2f)  # of which nothing is compiled
-    for parameters, alike in (({}, True), ({"coherence": "patch"}, True), (ON_SURFACE, False)):
-        bsdf = load(**parameters)
-        assert (operations(bsdf, anywhere) == operations(bsdf, nowhere)) == alike
-
-
-def test_variants_without_wavelengths_refuse_places():
-    mi.set_variant("scalar_rgb")
-    line = refusal(lambda: load(**ON_SURFACE))
-    assert "coherence='surface'" in line
-    assert "RGB" in line
-
-
-def test_a_table_of_powers_has_no_places(some_variant, tmp_path):
-    md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(tmp_path / "table.exr")
-    said = refusal(
-        lambda: mi.load_dict(
-            {"type": "diffraction", "filename": str(tmp_path / "table.exr"), **ON_SURFACE}
-        )
-    )
-    assert "coherence=ensemble" in said
-    assert "build another table with coherence=patch" in said
