@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics.blend import ScaleRoughness
+from mitsuba_diffraction.optics.blend import NODES_PER_OCTAVE, ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from mitsuba_diffraction.reference import boundary, fresnel, model
@@ -208,3 +208,12 @@ def test_smooth_surfaces_follow_small_slope_and_rough_ones_kirchhoff(index):
     assert model.blended(wi, wo, index, next(smooth)) == pytest.approx(gentle, abs=1e-3)
     rough = model.blended(wi, wo, index, model.small_slope_weight(20.0, 1.0, index))
     assert np.array_equal(rough, tangent)
+
+
+def test_a_table_of_nodes_interpolates_to_it():
+    exact = roughness()
+    table = exact.table(35.0)
+    q = np.geomspace(0.01, 35.0, 2000)
+    assert table.first + (len(table.nodes) - 1) / NODES_PER_OCTAVE >= np.log2(35.0)
+    assert table.at(q) == pytest.approx(exact.at(q), abs=5e-4 * table.nodes.max())
+    assert table.at(0.0) < 1e-30

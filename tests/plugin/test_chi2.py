@@ -47,7 +47,6 @@ CASES = {
 MORE = {
     "ensemble, 0°": Case(ROUGH, 0.0, (550.0,), SMALL),
     "ensemble, 80°": Case(ROUGH, 80.0, (700.0,), SMALL),
-    "narrower, 30°": Case(ROUGH, 30.0, (550.0,), SMALL | {"lateral_scale": 0.7}),
     "patch, 30°": Case(ROUGH, 30.0, (550.0,), SMALL | PATCH),
     "taylor, ensemble, 70°": Case(ROUGH, 70.0, (400.0,), SMALL | TAYLOR),
     "deep, 35°": Case(DEEP, 35.0, (400.0,), SMALL),

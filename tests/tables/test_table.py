@@ -59,6 +59,8 @@ def test_the_summary_is_plain_data():
     table = DiffractionTable.build(PATCH, **DEFAULTS)
     summary = json.loads(json.dumps(table.summary()))
     assert summary["basis"] == "svd"
+    # a patch as wide as the window: σ·dq is 2π/4
+    assert table.grid.taps == (4, 4)
     assert summary["measured_error"]["colours (all other orders)"] == table.error["far"]
     assert summary["source"]["name"] == "rough patch"
     assert "svd power, ensemble" in repr(table)
