@@ -14,7 +14,7 @@ from mitsuba_diffraction.optics.geometry import (
 )
 from mitsuba_diffraction.optics.mirror import horizon_correction, mirror_cosine
 from mitsuba_diffraction.optics.paths import ABOVE, Path, Returned, Side
-from mitsuba_diffraction.reference import fresnel
+from mitsuba_diffraction.reference import coat, fresnel
 from tests.support.directions import polar
 
 #: 2π/λ of 550 nm, rad/µm.
@@ -135,3 +135,11 @@ def test_opposite_grazing_directions_keep_their_precision():
     factor = kirchhoff_factor(polar(theta, 0), polar(theta, 180), 500.0, 1.0)
     exact = (2 * cos**2) ** 2 / (0.25 * np.pi * (2 * cos) ** 2 * cos**2)
     assert factor == pytest.approx(exact, rel=1e-10)  # cos itself is known to 1e-16/2e-5
+
+
+@pytest.mark.parametrize("side", [ABOVE, INSIDE, BEYOND_SHEET])
+def test_q_is_that_of_the_refracted_direction(side):
+    sine = np.sqrt(1.0 - COS_I**2)
+    direction = np.stack([sine, 0.0 * sine, COS_I], axis=-1)
+    inside = coat.refracted(direction, side.at_structure / side.index)
+    assert side.normal(COS_I) == pytest.approx(side.at_structure * inside[:, 2])

@@ -25,10 +25,11 @@ from mitsuba_diffraction.plugin.directions import PatchFrame, Site, TablePoint
 from mitsuba_diffraction.plugin.energy import _excess_of, reflectors_of
 from mitsuba_diffraction.plugin.energy_factors import ScaleRange
 from mitsuba_diffraction.plugin.power import power_model
+from mitsuba_diffraction.plugin.series import series_of
 from mitsuba_diffraction.tables.colour import cached_colours
 from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy
-from tests.support.directions import Array, as_single, polar
+from tests.support.directions import Array, as_single, polar, rough_patch
 from tests.support.kinds import FILMED, lit
 from tests.support.lanes import interaction
 from tests.support.layered import BELOW, FLAT, INDICES, PATCH, SIDES, both, load
@@ -282,3 +283,16 @@ def test_a_flat_coated_surface_s_own_albedo_leaves_no_excess():
     flat = Conservation(DirectionalTable(albedo.wavelengths, albedo.values * np.c_[rows]))
     (excess,) = _excess_of(Energy(bsdf.table, material, (400.0, 700.0)), flat)
     assert np.abs(excess.values).max() < 1e-5
+
+
+def test_order_0_and_weights_of_each_interval_are_the_table_s():
+    deep = rough_patch((16, 16), (0.15, 0.15), 0.8)
+    given = {"coherence_width": 2.4, "basis": "chebyshev", "tolerance": 0.02}
+    table = md.DiffractionTable.build(deep, **given)
+    series, expansion = series_of(table), table.expansion
+    assert expansion.intervals > 1
+    for kappa in expansion.kappa_max * np.linspace(0.03, 0.99, 9):
+        found = series.at(float(kappa))
+        assert found.interval == expansion.interval(kappa)
+        assert_allclose(found.order_0, table.order_0_at(kappa), atol=1e-5)
+        assert_allclose(found.weights[: expansion.terms], expansion.weights(kappa), atol=1e-5)

@@ -10,6 +10,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.paths import Path
+from mitsuba_diffraction.tables.directional import LAST_ANGLE, DirectionGrid
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
 from mitsuba_diffraction.tables.energy.conserved import Reflector, Transmitter
 from mitsuba_diffraction.tables.energy.gain import PathGain
@@ -261,3 +262,16 @@ def test_orders_that_do_not_overlap_send_on_the_light_of_an_ensemble() -> None:
         albedos.append(surface.albedos(Conservation(), theta, phi, 600.0)[0])
     # both tables' tolerance; a density had up to 13 % more light
     np.testing.assert_allclose(albedos[1], albedos[0], rtol=0.02)
+
+
+def test_the_grid_interpolates_what_is_linear_and_goes_round():
+    grid = DirectionGrid(10, 12)
+    assert grid.theta[0] == 0.0
+    assert grid.theta[-1] == pytest.approx(LAST_ANGLE)
+    rows = np.arange(11.0, dtype=np.float32)[:, None] + np.zeros((1, 12), np.float32)
+    theta = np.radians([0.0, 10.0, 47.0, 89.9])
+    found = grid.interpolation(theta, np.radians([-30.0, 0.0, 359.0, 725.0]))(rows)
+    assert found == pytest.approx(grid.row(theta), abs=1e-5)
+    round_ = np.cos(grid.phi).astype(np.float32) + np.zeros((11, 1), np.float32)
+    middle = grid.interpolation(0.5, np.radians([345.0, -15.0]))(round_)
+    assert middle == pytest.approx(0.5 * (1.0 + np.cos(np.radians(30.0))), abs=1e-6)

@@ -91,3 +91,13 @@ def test_what_a_table_keeps_for_the_next_material_changes_no_values() -> None:
             seen.append(albedo(table, *asked))
             assert np.array_equal(seen[-1], albedo(energy().table, *asked))
     assert not any(np.array_equal(seen[0], other) for other in seen[1:])
+
+
+@pytest.mark.parametrize("most", [1.5, 1.43, 0.1])
+def test_two_nodes_are_around_each_height_scale(most):
+    surface = energy(scale=most)
+    for height_scale in most * np.linspace(0.01, 1.0, 23):
+        low, high = surface.nodes(height_scale, height_scale)
+        assert low <= max(height_scale * (1 + 1e-5), 1e-3)
+        assert height_scale <= high * (1 + 1e-4)  # nodes catch what is that near
+        assert high <= most
