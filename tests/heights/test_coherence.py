@@ -66,14 +66,6 @@ def test_gratings_keep_the_usual_window_without_a_warning(kind, periods):
     assert resolved_width("auto", [cropped]) == pytest.approx(0.9)
 
 
-def test_a_scan_is_whole_periods_where_its_user_says_so():
-    field = scan()
-    whole = field.treated(periodic="exact")
-    assert resolved_width("auto", [whole]) == USUAL_WIDTH
-    assert whole.digest() != field.digest()
-    np.testing.assert_array_equal(whole.heights, field.heights)
-
-
 @pytest.mark.parametrize("width", ["auto", 65.0, 30.0])
 def test_a_scan_limits_the_window_of_its_orders_and_not_the_light_s(width):
     scanned = scan().changed(scan().heights, "cut out", cut_out=True)

@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction.optics.boundary import Heights
 from mitsuba_diffraction.optics.fresnel import reflectance
-from mitsuba_diffraction.optics.geometry import (
-    kirchhoff_factor,
-)
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from mitsuba_diffraction.optics.mirror import horizon_correction, mirror_cosine
 from mitsuba_diffraction.optics.paths import ABOVE, Path, Returned, Side
 from mitsuba_diffraction.reference import coat, fresnel

@@ -25,8 +25,8 @@ from mitsuba_diffraction.scene import load_scene
 from tests.support import ROOT
 from tests.support.gentle import load, pairs
 from tests.support.hostile import other_metals, plugins_in
-from tests.support.lanes import evaluated, refusal
-from tests.support.scenes import gentle_patch, searched
+from tests.support.lanes import evaluated
+from tests.support.scenes import searched
 
 
 def test_variants_may_be_switched_back_and_forth(some_variant):
@@ -142,23 +142,6 @@ def test_the_plugin_names_what_is_wrong():
         mi.load_dict({"type": "diffraction_preset"})
     with pytest.raises(RuntimeError, match="'presets'; did you mean preset"):
         mi.load_dict({"type": "diffraction_preset", "presets": "dvd"})
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", ["cd", "gold-foil", "dichroic-film", "snake"])
-def test_a_look_is_mixed_and_coated_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
-    mi.set_variant("llvm_ad_mono")
-    solved = kind_of(find_preset(name).patch) is FileKind.ORDERS
-    own: dict[str, Any] = (
-        {} if solved else {"filename": gentle_patch(tmp_path)["patch"], "pixel_size": 0.05}
-    )
-    mixed = {"type": "diffraction_mix", "look": md.preset(name, **own), "rest": {"type": "diffuse"}}
-    assert "Diffraction" in str(mi.load_dict({**mixed, "weight_look": 0.5}))
-    coated = md.preset(name, coat_ior=1.4, **own)
-    if not solved and "film_ior" not in coated:
-        assert "1.4" in str(mi.load_dict(coated))
-        return
-    assert "coat_ior" in refusal(lambda: mi.load_dict(coated))
 
 
 SCENE = '<scene version="3.0.0"><shape type="sphere">{}</shape></scene>'

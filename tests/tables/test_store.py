@@ -13,12 +13,7 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from mitsuba_diffraction import (
-    DiffractionError,
-    DiffractionTable,
-    DiffractionWarning,
-    HeightField,
-)
+from mitsuba_diffraction import DiffractionError, DiffractionTable, DiffractionWarning, HeightField
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables import source, store
 from mitsuba_diffraction.tables.store import Record, cache_folder, cached

@@ -9,12 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mitsuba_diffraction import (
-    DiffractionError,
-    DiffractionTable,
-    HeightField,
-    reference,
-)
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, reference
 from tests.support.directions import rough_patch
 from tests.support.patches import DEEP, DEFAULTS, PATCH
 
