@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
+import importlib
 import multiprocessing
 import secrets
 import signal
@@ -184,4 +185,5 @@ def _hangs(*_: object) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    # processes are not started from a module of this name
+    sys.exit(importlib.import_module("tests.fuzz.__main__").main())
