@@ -64,9 +64,6 @@ def test_near_the_mirror_both_agree_to_first_order_cross_terms_included(index):
     assert differences[1] < 0.015 * differences[0]  # quadratic: 0.01, and a little of the cubic
 
 
-# ------------------------------------------------------------------------------------- Mueller
-
-
 def test_a_mueller_matrix_does_to_stokes_vectors_what_the_jones_matrix_does_to_fields():
     rng = np.random.default_rng(1)
     jones = rng.normal(size=(20, 2, 2)) + 1j * rng.normal(size=(20, 2, 2))

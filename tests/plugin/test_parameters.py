@@ -55,9 +55,6 @@ def loads(**parameters):
     return lambda: mi.load_dict({"type": "diffraction", **parameters})
 
 
-# ------------------------------------------------------------------------ sources of heights
-
-
 def test_an_image_an_array_a_recipe_and_a_table_are_one_surface(some_variant, png, table_file):
     # files are seen through windows, fields tile the plane as they are
     whole = SMALL | {"periodic": "exact"}
@@ -109,9 +106,6 @@ def test_a_patch_in_memory_keeps_its_history(some_variant):
     bsdf = load(field)
     assert (bsdf.heights().digest(), bsdf.heights().history) == (field.digest(), field.history)
     assert bsdf.table.source["digest"] == field.digest()
-
-
-# ------------------------------------------------------------------------ warnings
 
 
 @pytest.fixture

@@ -18,9 +18,6 @@ SMALL = rough_patch((12, 15), (0.13, 0.15), 0.3)
 SIGMA = 0.45
 
 
-# ------------------------------------------------------------------------ the integral itself
-
-
 @pytest.mark.parametrize("coherence", reference.COHERENCES)
 @pytest.mark.parametrize("kappa", [0.0, 7.0, 31.0])
 def test_the_power_is_that_of_a_sum_over_pixels_of_the_plane(coherence, kappa):
@@ -73,9 +70,6 @@ def test_an_ensemble_is_the_mean_over_all_places():
     assert values.mean() == pytest.approx(reference.brdf(SMALL, wi, wo, 550.0, **given)[0], 1e-9)
 
 
-# ------------------------------------------------------------------------ gratings
-
-
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_facet_that_descends_towards_an_axis_reflects_towards_it(axis):
     # one wavelength of path at normal incidence: all light leaves in order +1
@@ -90,9 +84,6 @@ def test_a_facet_that_descends_towards_an_axis_reflects_towards_it(axis):
         )
         # sinc² of 0 against sinc² of 2: nothing but what sampling with 64 pixels leaves
         assert lit > 1e4 * dark
-
-
-# ------------------------------------------------------------------------ arguments and limits
 
 
 def test_an_open_patch_sends_nothing_beyond_its_pixels_frequencies():

@@ -74,9 +74,6 @@ def test_a_table_comes_back_bit_by_bit(table, tmp_path):
     assert json.dumps(loaded.summary()) == json.dumps(table.summary())
 
 
-# ------------------------------------------------------------------------ what is no table
-
-
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -169,9 +166,6 @@ def test_a_table_whose_coefficients_are_no_powers(saved, value):
     next(iter(contents.channels.values()))[3, 4] = value
     contents.write(saved)
     assert f"'{saved}' is a damaged table (" in refused(saved)
-
-
-# ------------------------------------------------------------------------ what cannot be written
 
 
 @pytest.mark.parametrize(
