@@ -24,6 +24,7 @@ from mitsuba_diffraction.heights.spectra import (
     frequencies,
     height_spectrum,
     order_powers,
+    profile,
     seen_slope,
 )
 from mitsuba_diffraction.tables.powers import order_0_power
@@ -232,3 +233,12 @@ def test_an_abg_model_is_found_again():
 def test_heights_that_are_not_far_below_the_wavelength_are_named():
     with pytest.warns(DiffractionWarning, match="Rayleigh-Rice"):
         rayleigh_rice_scatter(gratings.sinusoidal(period=2.0, depth=0.4, periods=2), 632.8)
+
+
+def test_profiles_separate_directions():
+    field = sinusoidal(1.0, 0.2, periods=20, rows=640)
+    edges = np.array([0.5, 0.9, 1.1, 2.0])
+    density = height_spectrum(field)
+    along, across = (profile(density, field, edges, d) for d in ("x", "y"))
+    assert along.argmax() == 1
+    assert across.max() < 1e-6 * along.max()  # the window's side lobes
