@@ -3,7 +3,6 @@
 Contents
 --------
 surfaces       height fields built, saved, loaded, looked up in NumPy and in the plugin
-looked_up      tables that may be damaged, looked up in NumPy and in the plugin
 damage         files of tables, heights, recipes, meshes, plans and scenes with random damage
 orders         files of solved orders with random damage
 energy         scales, layers, speckle and nested light in a white furnace

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
-import json
+import importlib
+import multiprocessing
 import secrets
 import signal
-import subprocess
 import sys
-import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from multiprocessing.connection import Connection, wait
 from typing import NamedTuple
 
 import numpy as np
@@ -81,8 +80,6 @@ def main() -> int:
     parser.add_argument("--kind", choices=KINDS, action="append", help="default: all")
     parser.add_argument("--case", type=int, help="this one only, with --seed and --kind")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--worker", type=int, help=argparse.SUPPRESS)
-    parser.add_argument("--log", type=Path, help=argparse.SUPPRESS)
     args = parser.parse_args()
     kinds = args.kind or list(KINDS)
     if args.case is not None:
@@ -90,63 +87,62 @@ def main() -> int:
         run_case(kinds[0], args.seed or 0, args.case)
         return 0
     seed = secrets.randbelow(2**31) if args.seed is None else args.seed
-    if args.worker is not None:
-        return _work(args, kinds, seed)
     print(f"seed {seed}", flush=True)
     return _supervise(args, kinds, seed)
 
 
 def _supervise(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
     """Run the workers in processes of their own, which may die."""
-    start = time.monotonic()
-    failed, counts = [], dict.fromkeys(kinds, 0)
-    with tempfile.TemporaryDirectory() as folder:
-        workers = []
-        for n in range(args.jobs):
-            log = Path(folder, f"{n}.jsonl")
-            words = ["--seed", seed, "--seconds", args.seconds, "--jobs", args.jobs]
-            words += [] if args.rounds is None else ["--rounds", args.rounds]
-            words += ["--worker", n, "--log", log, *(w for k in kinds for w in ("--kind", k))]
-            command = [sys.executable, "-m", "tests.fuzz", *map(str, words)]
-            workers.append((log, subprocess.Popen(command)))
-        for log, worker in workers:
-            code = worker.wait()
-            written = log.read_text("utf-8") if log.exists() else ""
-            entries = [json.loads(line) for line in written.splitlines()]
-            for entry in entries:
-                counts[entry["kind"]] += "text" not in entry
-            failed += [entry for entry in entries if "text" in entry]
-            if code < 0 or (code > 0 and entries):
-                failed.append(entries[-1] | {"text": f"the process ended with exit code {code}"})
-            elif code:
-                failed.append({"kind": kinds[0], "number": 0, "text": "no case was run"})
-    for entry in failed:
-        repeat = f"--kind {entry['kind']} --seed {seed} --case {entry['number']}"
-        print(f"FAILED python -m tests.fuzz {repeat}: {entry['text']}")
+    start, failed, counts = time.monotonic(), [], dict.fromkeys(kinds, 0)
+    spawning = multiprocessing.get_context("spawn")
+    workers = {}
+    for n in range(args.jobs):
+        told, tells = spawning.Pipe(duplex=False)
+        worker = spawning.Process(target=_work, args=(tells, n, args, kinds, seed))
+        worker.start()
+        tells.close()
+        workers[told] = worker
+    last = dict.fromkeys(workers, (kinds[0], 0))
+    while workers:
+        for told in wait(list(workers)):
+            try:
+                kind, number, text = told.recv()
+            except EOFError:
+                (worker := workers.pop(told)).join()
+                if worker.exitcode:
+                    text = f"the process ended with exit code {worker.exitcode}"
+                    failed.append((*last[told], text))
+                continue
+            last[told] = kind, number
+            if text:
+                failed.append((kind, number, text))
+            counts[kind] += text is None
+    for kind, number, text in failed:
+        repeat = f"--kind {kind} --seed {seed} --case {number}"
+        print(f"FAILED python -m tests.fuzz {repeat}: {text}")
     print(", ".join(f"{count} {kind}" for kind, count in counts.items()), end="")
     print(f" in {time.monotonic() - start:.0f} s: {len(failed)} failed")
     return 1 if failed else 0
 
 
-def _work(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
-    """Run cases: each is logged before it begins, and again if it fails."""
+def _work(
+    told: Connection, worker: int, args: argparse.Namespace, kinds: list[str], seed: int
+) -> None:
+    """Run cases: each is told before it begins, and again if it fails."""
     _prepare()
-    cases = _timed(args, kinds) if args.rounds is None else _counted(args, kinds)
-    with own_program(), args.log.open("w", encoding="utf-8", buffering=1) as log:
-        for kind, number in cases:
-            entry = {"kind": kind, "number": number}
-            print(json.dumps(entry), file=log)
-            text = _failure(kind, seed, number)
-            if text:
-                print(json.dumps(entry | {"text": text}), file=log)
-    return 0
+    cases = _timed if args.rounds is None else _counted
+    with own_program():
+        for kind, number in cases(args, kinds, worker):
+            told.send((kind, number, None))
+            if text := _failure(kind, seed, number):
+                told.send((kind, number, text))
 
 
-def _timed(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, int]]:
+def _timed(args: argparse.Namespace, kinds: list[str], worker: int) -> Iterator[tuple[str, int]]:
     """Yield a worker's cases until the time is up, each kind for its share of it."""
     start = time.monotonic()
     spent = dict.fromkeys(kinds, 0.0)
-    number = dict.fromkeys(kinds, args.worker)
+    number = dict.fromkeys(kinds, worker)
     while (begin := time.monotonic()) - start < args.seconds:
         kind = min(kinds, key=lambda k: spent[k] / KINDS[k].share)
         yield kind, number[kind]
@@ -154,10 +150,10 @@ def _timed(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, in
         number[kind] += args.jobs
 
 
-def _counted(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, int]]:
+def _counted(args: argparse.Namespace, kinds: list[str], worker: int) -> Iterator[tuple[str, int]]:
     """Yield a worker's cases of `--rounds`: the same on every machine, however fast."""
     for kind in kinds:
-        for number in range(args.worker, args.rounds * KINDS[kind].round, args.jobs):
+        for number in range(worker, args.rounds * KINDS[kind].round, args.jobs):
             yield kind, number
 
 
@@ -189,4 +185,5 @@ def _hangs(*_: object) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    # processes are not started from a module of this name
+    sys.exit(importlib.import_module("tests.fuzz.__main__").main())

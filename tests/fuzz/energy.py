@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 from tests.fuzz.surfaces import log_uniform
 from tests.support.directions import polar
+from tests.support.furnace import loaded
 from tests.support.lanes import interaction, lanes, spectra, vectors
 
 _DIRECTIONS, _VALUES = 3, 256
@@ -66,7 +64,7 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         value = float(rng.choice(_HOSTILE))
         plain = {"type": "uniform", "value": value}
         # Mitsuba looks at no texel
-        reflectance = _texture(np.full(_TEXELS, value)) if rng.random() < 0.5 else plain
+        reflectance = np.full(_TEXELS, value) if rng.random() < 0.5 else plain
         chosen["beneath"] = {"type": "diffuse", "reflectance": reflectance}
     chosen |= {
         "coherence_width": max(0.5, float(np.mean(field.extent)) * log_uniform(rng, 0.1, 20.0)),
@@ -83,7 +81,7 @@ def parameters(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any
         factor, drawn = log_uniform(rng, low, high), rng.random()
         # scales of energy of a varying sheet or patch, or of all wavelengths, take a minute
         if drawn < 0.05 and mi.is_monochromatic and not {"plugin", "coherence"} & set(chosen):
-            chosen[name] = _texture(rng.uniform(0.6, 1.0, _TEXELS) * factor)
+            chosen[name] = rng.uniform(0.6, 1.0, _TEXELS) * factor
         # scales of energy of stretched heights that let light through take 10 s
         elif drawn < (0.12 if name == "lateral_scale" and "plugin" in chosen else 0.35):
             chosen[name] = factor
@@ -102,10 +100,6 @@ def _stack(rng: np.random.Generator) -> str:
         pairs[0][0] += f"+{log_uniform(rng, 1e-4, 0.3):.5f}i"
     repeat, spread = int(rng.integers(1, 6)), rng.choice([0.0, 0.05])
     return f"layers = {json.dumps(pairs)}\nrepeat = {repeat}\nspread = {spread}\n"
-
-
-def _texture(texels: NDArray[np.float64]) -> dict[str, Any]:
-    return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(texels.astype(np.float32))}
 
 
 def surface(rng: np.random.Generator) -> md.HeightField:
@@ -146,7 +140,7 @@ def check(rng: np.random.Generator) -> None:
         shape = (grooves, domes, surface)[rng.choice(3, p=[0.1, 0.1, 0.8])]
         field = shape(rng)
         asked = parameters(rng, field)
-        bsdf = _load(field, asked)
+        bsdf = loaded(field, asked)
     except md.DiffractionError:
         return
     except RuntimeError as error:
@@ -180,21 +174,12 @@ def check(rng: np.random.Generator) -> None:
     _check_values(bsdf, light(_VALUES), wo, where)
 
 
-def _load(field: md.HeightField, asked: dict[str, Any]) -> Any:
-    if "layers" not in asked:
-        return mi.load_dict(md.bsdf_dict(field, **asked))
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "stack.toml")
-        file.write_text(asked["layers"], encoding="utf-8")
-        return mi.load_dict(md.bsdf_dict(field, **asked | {"layers": str(file)}))
-
-
 def _albedo_beneath(asked: dict[str, Any]) -> float:
     """Return the albedo of the BSDF beneath, at least 1."""
     if "beneath" not in asked:
         return 1.0
     reflectance = asked["beneath"]["reflectance"]
-    value = reflectance["value"] if "value" in reflectance else np.min(reflectance["bitmap"])
+    value = reflectance["value"] if isinstance(reflectance, dict) else reflectance.min()
     return max(1.0, float(value))  # 1 for NaN
 
 

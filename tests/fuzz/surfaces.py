@@ -92,17 +92,16 @@ def _check_look_ups(
     given = {name: asked[name] for name in ("coherence_width", "coherence")}
     exact = md.reference.brdf(field, wi, wo, wavelength, **given)
     factor = kirchhoff_factor(wi, wo, wavelength, sigma)
-    most = _SAMPLING * asked["tolerance"]
-    _compare(table.brdf(wi, wo, wavelength) / factor, exact / factor, near, most, "NumPy")
-    value = brdf_values(bsdf, wi, wo, np.asarray(wavelength)[:, None])
-    _compare(np.ravel(value) / factor, exact / factor, near, most + _SINGLE, "plugin")
-
-
-def _compare(value: Any, exact: Any, near: Any, most: float, what: str) -> None:
-    if not (np.isfinite(value).all() and (value >= 0.0).all()):
-        raise ArithmeticError(f"{what}: not finite, or negative")
-    for part in (near, ~near):
-        total = exact[part].sum()
-        if total > 1e-12 * exact.sum():
-            error = float(np.abs(value - exact)[part].sum() / total)
-            assert error <= most, f"{what}: error {error:.3g}, allowed {most:.3g}"
+    values = {
+        "NumPy": table.brdf(wi, wo, wavelength),
+        "plugin": np.ravel(brdf_values(bsdf, wi, wo, np.asarray(wavelength)[:, None])),
+    }
+    for what, value in values.items():
+        if not (np.isfinite(value).all() and (value >= 0.0).all()):
+            raise ArithmeticError(f"{what}: not finite, or negative")
+        most = _SAMPLING * asked["tolerance"] + (_SINGLE if what == "plugin" else 0.0)
+        for part in (near, ~near):
+            total = (exact / factor)[part].sum()
+            if total > 1e-12 * (exact / factor).sum():
+                error = float((np.abs(value - exact) / factor)[part].sum() / total)
+                assert error <= most, f"{what}: error {error:.3g}, allowed {most:.3g}"

@@ -13,7 +13,6 @@ from mitsuba_diffraction.heights.coherence import (
     resolved,
     resolved_width,
     widest_window,
-    window_places,
     window_warning,
 )
 from mitsuba_diffraction.heights.field import HeightField
@@ -67,20 +66,6 @@ def test_gratings_keep_the_usual_window_without_a_warning(kind, periods):
     assert resolved_width("auto", [cropped]) == pytest.approx(0.9)
 
 
-def test_a_scan_is_whole_periods_where_its_user_says_so():
-    field = scan()
-    whole = field.treated(periodic="exact")
-    assert resolved_width("auto", [whole]) == USUAL_WIDTH
-    assert whole.digest() != field.digest()
-    np.testing.assert_array_equal(whole.heights, field.heights)
-
-
-def test_what_is_asked_for_is_kept():
-    settings = TableSettings(coherence_width="30")
-    array = HeightField(scan().heights, 0.1)
-    assert resolved(settings, [array]).width == 30.0
-
-
 @pytest.mark.parametrize("width", ["auto", 65.0, 30.0])
 def test_a_scan_limits_the_window_of_its_orders_and_not_the_light_s(width):
     scanned = scan().changed(scan().heights, "cut out", cut_out=True)
@@ -90,20 +75,3 @@ def test_a_scan_limits_the_window_of_its_orders_and_not_the_light_s(width):
     assert resolved(limited, [scanned]) == limited
     wide = scanned.treated(periodic="exact")
     assert resolved(limited, [wide]).window_width is None
-
-
-@pytest.mark.parametrize("width", ["auto", 30.0])
-def test_one_window_has_one_width(width):
-    settings = TableSettings(coherence_width=width, coherence="patch")
-    assert resolved(settings, [scan()]).window_width is None
-    assert resolved(TableSettings(), [scan()]).width == pytest.approx(6.4)
-    assert resolved(TableSettings(windows=4.0), [scan()]).width == 4.0
-
-
-@pytest.mark.parametrize("window", [97.0, 131.0, 230.0])
-def test_windows_of_a_scan_are_no_longer_than_asked_and_reach_its_end(window):
-    starts, length = window_places(1000, window)
-    assert 0.9 * window < length <= window
-    assert starts[0] == 0
-    assert starts[-1] == 1000 - length
-    assert np.diff(starts).max() <= 0.55 * length  # they overlap by half

@@ -7,15 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.recipes import _KEYS, LOAD_KEYS
+from mitsuba_diffraction.heights.recipes import _KEYS
 from mitsuba_diffraction.heights.source import Source
-from mitsuba_diffraction.settings import RECIPE_SETTINGS
 from tests.support.pages import first_columns
 
 PRECOMPUTE = Path(__file__).resolve().parent.parent.parent / "precompute"
@@ -124,10 +121,7 @@ def test_seeds_are_several_patches(folder):
     [
         ("# nothing", ["source", "generator"]),
         ('source = "a.npy"\ngenerator = "blazed"', ["either"]),
-        (
-            'source = "a.npy"\ncoherence_widht = 3',
-            ["'coherence_widht'", "did you mean coherence_width?"],
-        ),
+        ('source = "a.npy"\ncoherence_widht = 3', ["'coherence_widht'", "mean coherence_width?"]),
         ("source = 3", ["source", "3"]),
         ("source = []", ["source", "[]"]),
         ('source = ""', ["source"]),
@@ -189,24 +183,6 @@ def test_files_that_are_no_recipes(tmp_path):
     for name, word in [("a", "UTF-8"), ("b", "too large"), ("c", "folder"), ("d", "not exist")]:
         with pytest.raises(DiffractionError, match=word):
             HeightField.load(tmp_path / f"{name}.toml")
-
-
-values = st.sampled_from(
-    ['"a.npy"', '"blazed"', '"plane"', "0", "0.1", "-1", "nan", "inf", "true", "[]", "[1, 2]",
-     '["a.npy"]', '"auto"', "{ period = 1, depth = 2, rows = 2 }", "1979-05-27", '""', "9" * 30]
-)  # fmt: skip
-keys = st.sampled_from(["source", "generator", "arguments", "seeds", "output", "x",
-                        *LOAD_KEYS, *RECIPE_SETTINGS])  # fmt: skip
-
-
-@settings(max_examples=200)
-@given(st.dictionaries(keys, values, max_size=5))
-def test_random_recipes_load_or_are_one_clear_line(folder, content):
-    path = write(folder, "\n".join(f"{key} = {value}" for key, value in content.items()))
-    try:
-        Source.of(path).fields()
-    except DiffractionError as error:
-        assert "\n" not in str(error)
 
 
 def test_keys_of_recipes_are_listed():

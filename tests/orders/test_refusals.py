@@ -12,7 +12,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.heights import Recipe
+from mitsuba_diffraction.heights import Source
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
 from mitsuba_diffraction.orders.listed import Lights, listed_table
 from mitsuba_diffraction.orders.listing import list_orders
@@ -195,7 +195,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
         for change in ({"superstrate": 1.2}, {"thin": True}, {"block": 1.001}, {"block": 7.0})
     ),
     (lambda: replace(OrderTable.mirror(0.5, superstrate=1.5), thin=True), "both sides"),
-    (lambda: Recipe.load(file("groove.toml", RECIPE)), "the command 'solve groove.toml'"),
+    (lambda: Source.of(file("groove.toml", RECIPE)), "the command 'solve groove.toml'"),
     (lambda: OrderTable.load(file("groove.toml", RECIPE)), "the command 'solve groove.toml'"),
     (lambda: OrderTable.load(saved(md.DiffractionTable.build(
         HeightField(np.eye(8), 0.2), coherence_width=1.6, tolerance=0.5), "a.exr")),

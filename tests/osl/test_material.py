@@ -190,16 +190,6 @@ def test_blender_installs_the_addon_and_has_assets(tmp_path, grating):
     assert found["after"] == sorted([*found["before"], "grating"])
 
 
-def test_unknown_object_is_one_line(tmp_path, grating):
-    exported(grating, tmp_path, "grating")
-    output = tmp_path / "out.blend"
-    done = run_in_blender(tmp_path / "blender_material.py", "--object", "Ring", "--output", output)
-    assert not output.exists()
-    assert done.returncode != 0
-    assert "no mesh object 'Ring'; the file has Cube" in done.stderr
-    assert "Traceback" not in done.stderr
-
-
 PERIOD = 1.6
 
 
@@ -217,12 +207,6 @@ def table_of(values, superstrate=1.0):
 
 def exported_table(table, folder, **parameters):
     return md.osl.export(mi.load_dict(md.bsdf_dict(table, **parameters)), folder)
-
-
-def test_white_mirror_under_a_layer_is_white(tmp_path):
-    mirror = OrderTable.mirror(PERIOD, superstrate=1.5)
-    seen = plane_seen(exported_table(mirror, tmp_path), [0, 60])
-    assert seen.mean == pytest.approx(1.0, abs=0.02)
 
 
 def test_lossless_grating_is_white(tmp_path):

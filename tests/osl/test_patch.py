@@ -1,4 +1,4 @@
-"""Textures of patches against the table, and surfaces that the shader lacks."""
+"""Textures and formulas of shaders against the table, and surfaces that cannot be exported."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from PIL import Image
 from scipy.ndimage import map_coordinates
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction import DiffractionError, OrderTable
+from mitsuba_diffraction.optics.boundary import MODELS
 from mitsuba_diffraction.osl.export import OSL, pigment_of, shader_of
 from mitsuba_diffraction.osl.patch import (
     BANDS,
@@ -25,10 +26,17 @@ from mitsuba_diffraction.osl.patch import (
     patch_constants,
     patch_textures,
 )
+from mitsuba_diffraction.osl.solved import MOST_BYTES, interpolation_error
+from mitsuba_diffraction.osl.spectrum import NODES, drawn_spectrum
 from mitsuba_diffraction.plugin.description import Quantity, Surface
+from mitsuba_diffraction.shading.orders import pack_orders
 from mitsuba_diffraction.tables.directional import FINE, DirectionalTable
 from mitsuba_diffraction.tables.powers import powers_at
+from tests.support.blender import blender
 from tests.support.descriptions import CHANGES, ELSEWHERE, base
+from tests.support.formulas import INDICES, check, exact_power, pairs
+from tests.support.languages import emitted
+from tests.support.orders import thin_grating
 from tests.support.patches import DEEP, DEFAULTS, PATCH, SMALL_SCAN
 
 
@@ -165,23 +173,16 @@ def test_a_small_scan_limits_the_window_of_orders_and_not_the_mirror_s(tmp_path,
         assert f"#define SCAN_WIDTH {width}\n" in exported.shader.read_text(encoding="utf-8")
 
 
-def test_patch_has_a_height_scale(tmp_path, some_variant):
-    raw = {"energy_conserving": False}
-    bsdf = mi.load_dict(md.bsdf_dict(PATCH, **DEFAULTS, height_scale=0.5, **raw))
-    exported = md.osl.export(bsdf, tmp_path, "skin")
-    values = inputs_of(exported)
-    assert values["HeightScale"] == 0.5
-    assert values["Stretch"] == 1.0
-    assert values["Pigment"] == [0.0, 0.0, 0.0]
-
-
 def test_coat_pigment_and_stretch_are_those_of_the_surface(tmp_path, some_variant):
     colour = [0.3, 0.1, 0.02]
     pigment = {"type": "diffuse", "reflectance": {"type": "rgb", "value": colour}}
-    bsdf = md.bsdf_dict(PATCH, **DEFAULTS, coat_ior=1.25, pigment=pigment, lateral_scale=0.8)
+    bsdf = md.bsdf_dict(
+        PATCH, **DEFAULTS, coat_ior=1.25, pigment=pigment, lateral_scale=0.8, height_scale=0.5
+    )
     exported = md.osl.export(mi.load_dict(bsdf), tmp_path, "skin")
     values = inputs_of(exported)
     assert values["Stretch"] == pytest.approx(0.8)
+    assert values["HeightScale"] == 0.5
     # spectral variants have upsampled the colour, within a per cent or two
     assert values["Pigment"] == pytest.approx(colour, abs=0.01)
     coat = re.search(r"#define COAT (\S+)", exported.shader.read_text(encoding="utf-8"))
@@ -207,3 +208,68 @@ def test_every_feature_that_is_shown_changes_what_is_exported(some_variant):
     plain = exported_of(base())
     for feature in OSL.shows - ELSEWHERE:
         assert exported_of(dataclasses.replace(base(), **CHANGES[feature])) != plain, feature
+
+
+TABLE = thin_grating()
+
+
+def test_error_of_the_textures_is_measured():
+    mean, worst = interpolation_error(TABLE, pack_orders(TABLE, MOST_BYTES)).values()
+    assert 0.0 < mean < worst < 0.01
+
+
+def test_mean_of_the_spectrum_is_white():
+    wavelengths, by_space = drawn_spectrum()
+    u = np.linspace(0.0, 1.0, NODES)
+    for colours in by_space.values():
+        assert colours.mean(axis=1).min() > 0.0  # Cycles draws by it
+        # linear between nodes, as the shader interpolates
+        assert np.trapezoid(colours, u, axis=0) == pytest.approx(1.0, abs=1e-6)
+    assert np.all(np.diff(wavelengths) > 0)
+
+
+def test_document_names_files_and_sockets(tmp_path, some_variant):
+    bsdf = mi.load_dict(md.bsdf_dict(TABLE, coherence_width=30, orientation=20))
+    exported = md.osl.export(bsdf, tmp_path / "new" / "folder", "cd")
+    document = json.loads(exported.document.read_text(encoding="utf-8"))
+    values = {item["identifier"]: item["default"] for item in document["inputs"]}
+    assert (values["CoherenceWidth"], values["Rotation"]) == (30.0, 20.0)
+    source = exported.shader.read_text(encoding="utf-8")
+    assert all(f" {name} = " in source for name in values)
+    for name in (document["shader"], *document["textures"].values()):
+        assert (exported.document.parent / name).is_file()
+    assert not [path for path in exported.document.parent.iterdir() if path.name.startswith(".")]
+
+
+def test_folder_is_no_part_of_what_is_written(tmp_path, some_variant):
+    folder = tmp_path / 'z", float Evil = 1, string Q = "'
+    exported = md.osl.export(mi.load_dict(md.bsdf_dict(OrderTable.mirror(1.0))), folder, "cd")
+    for file in (exported.shader, exported.document):
+        text = file.read_text(encoding="utf-8")
+        assert "Evil" not in text
+        assert str(tmp_path) not in text
+    assert 'string OrdersFile = "cd_orders.exr"' in exported.shader.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "name", ["", "1cd", "a b", "../cd", "if", "while", "md_lobe", "PERIOD", "mix", "Wavelengths"]
+)
+def test_name_must_be_that_of_a_shader(tmp_path, some_variant, name):
+    with pytest.raises(DiffractionError, match="name="):
+        md.osl.export(mi.load_dict(md.bsdf_dict(OrderTable.mirror(1.0))), tmp_path, name)
+
+
+def test_folder_that_is_a_file_is_refused(tmp_path, some_variant):
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(DiffractionError, match="taken"):
+        md.osl.export(mi.load_dict(md.bsdf_dict(OrderTable.mirror(1.0))), tmp_path / "taken")
+
+
+PAIRS = pairs(64**2)
+
+
+def test_boundary_is_that_of_the_reference(tmp_path):
+    blender()
+    indices, model = list(INDICES.values()), MODELS["small_slope"]
+    for index, found in zip(indices, emitted(tmp_path, PAIRS, model, indices), strict=True):
+        check(found, exact_power(PAIRS, index))

@@ -15,7 +15,7 @@ from tests.support import layered
 from tests.support.directions import Array
 from tests.support.gentle import load, pairs
 from tests.support.kinds import KINDS, MIX, THROUGH, made
-from tests.support.lanes import brdf_values, evaluated, interaction, vectors
+from tests.support.lanes import brdf_values, evaluated, interaction, vectors, with_bitmaps
 
 
 def test_a_changed_height_scale_is_a_factor_on_the_table_s_heights(variant):
@@ -31,6 +31,10 @@ def test_a_changed_height_scale_is_a_factor_on_the_table_s_heights(variant):
 
 RANGE = "must be above 0 and at most 1.5, the table's range; load the plugin anew"
 COATED = {"eta": 0.9, "k": 6.0, "coat_ior": 1.58}
+FILMED = {
+    "eta": 0.9, "k": 6.0, "film_ior": 1.4, "film_thickness": np.full((2, 2), 0.5),
+    "film_thickness_max": 300.0,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -38,13 +42,15 @@ COATED = {"eta": 0.9, "k": 6.0, "coat_ior": 1.58}
     [
         ({}, "height_scale", 1.51, RANGE),
         (COATED, "height_scale", 1.6, RANGE),
+        (FILMED, "film_thickness.data", 1.5, "film_thickness: the texture's numbers"),
         (COATED, "coat_eta", 0.9, "coat_eta=0.9"),
         (COATED, "coat_eta", 2.9, "beyond the table's 2.37"),
     ],
 )
 def test_a_change_beyond_the_table_is_a_named_error(some_variant, given, name, value, said):
-    parameters = mi.traverse(load(**given))
-    parameters[name] = value
+    parameters = mi.traverse(load(**with_bitmaps(given)))
+    texels = name.endswith("data")
+    parameters[name] = dr.full(mi.TensorXf, value, (2, 2, 1)) if texels else value
     with pytest.raises((md.DiffractionError, RuntimeError)) as caught:
         parameters.update()
     *_, line = str(caught.value).splitlines()
@@ -52,14 +58,15 @@ def test_a_change_beyond_the_table_is_a_named_error(some_variant, given, name, v
 
 
 def test_a_new_value_needs_no_new_kernel(variant):
-    bsdf = load()
+    bsdf = load(int_ior=1.5, lateral_scale=1.0)
     parameters = mi.traverse(bsdf)
     wi, wo, lam = pairs(20)
     si, outgoing, context = interaction(wi, lam[:, None]), vectors(wo), mi.BSDFContext()
+    changed = {"height_scale": 1.0, "lateral_scale": 1.0, "orientation": 10.0, "eta": 2.0}
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         for scale in (0.7, 0.8, 0.9):
-            parameters["height_scale"] = scale
-            parameters["orientation"] = 10 * scale
+            for name, factor in changed.items():
+                parameters[name] = factor * scale
             parameters.update()
             dr.eval(bsdf.eval(context, si, outgoing))
             history = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]

@@ -44,6 +44,7 @@ def test_consumer_shows_a_feature_or_refuses_it_in_one_line(chosen, refused, lef
         assert any(feature.phrase(described.model) in refusal for feature in missing)
 
 
+BOARD = {"type": "checkerboard"}
 ALUMINIUM = {"eta": 0.9, "k": 6.0}
 PARAMETERS = [
     ({"material": "none"}, Feature.MIRROR),
@@ -51,14 +52,7 @@ PARAMETERS = [
     ({"int_ior": 1.2, "ext_ior": 1.5}, Feature.RARER),
     ({"coat_ior": 1.3}, Feature.COAT),
     ({"film_ior": 1.3, "film_thickness": 100.0}, Feature.FILM),
-    (
-        {
-            "film_ior": 1.3,
-            "film_thickness": {"type": "checkerboard"},
-            "film_thickness_max": 200.0,
-        },
-        Feature.VARYING_FILM,
-    ),
+    ({"film_ior": 1.3, "film_thickness_max": 200.0, "film_thickness": BOARD}, Feature.VARYING_FILM),
     ({"model": "kirchhoff"}, Feature.KIRCHHOFF),
     ({"shadowing": "vcavity"}, Feature.SHADOWING),
     ({"coherence": "patch"}, Feature.PATCH),

@@ -1,6 +1,8 @@
-"""Conservation of energy: white furnaces, and what stays raw."""
+"""Conservation of energy: white furnaces of surfaces on one side or both, and what stays raw."""
 
 from __future__ import annotations
+
+import math
 
 import drjit as dr
 import mitsuba as mi
@@ -8,36 +10,30 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.support.directions import polar, uniform_directions
+from mitsuba_diffraction.tables.energy.settings import EnergySettings
+from tests.support.coarse import energy_as
+from tests.support.directions import polar, rough_patch, uniform_directions
 from tests.support.furnace import (
-    COMBINATIONS,
     DIELECTRIC,
+    FURNACES,
+    FURNACES_MORE,
     SURFACES,
-    assert_at_most_white,
+    WHITE,
     bsdf,
-    check_combination,
+    check_furnace,
     furnace_in,
     random_directions,
+    sent_on,
     steep_sinusoid,
-    white_pair,
 )
 from tests.support.lanes import bitmap, evaluated
+from tests.support.layered import SIDES, both
 
 pytestmark = pytest.mark.usefixtures("fine")
 
 #: Every surface with random numbers of its own.
 SEEDED = [(name, seed) for seed, name in enumerate(SURFACES)]
 LIGHT = [[400.0, 500.0, 600.0, 700.0]]
-
-
-def thorough(test):
-    """Mark a test as one of `make test-all` alone, in every variant."""
-    return pytest.mark.thorough(pytest.mark.usefixtures("variant")(test))
-
-
-@pytest.mark.parametrize("base", [False, True])
-def test_white_furnace_of_a_dielectric(some_variant, base):
-    assert_at_most_white(white_pair("rough") if base else bsdf("rough", **DIELECTRIC))
 
 
 def test_a_dielectric_is_as_it_is(some_variant, coarsely):
@@ -62,32 +58,10 @@ def test_scales_that_come_and_go_with_the_heights_load_and_update(some_variant, 
 
 
 @pytest.mark.parametrize(
-    ("field", "parameters"),
-    [
-        each if n % 4 == 0 else pytest.param(*each, marks=pytest.mark.thorough)
-        for n, each in enumerate(COMBINATIONS)
-    ],
+    "name", [*FURNACES, *(pytest.param(name, marks=pytest.mark.thorough) for name in FURNACES_MORE)]
 )
-def test_combinations_send_on_no_more_than_they_get(mono, field, parameters):
-    check_combination(field, parameters)
-
-
-def test_orders_that_graze_along_steps_bring_no_light(mono):
-    """The horizon cuts a lobe whose light rises as 1/cosθ: 1.18 came from 88.5°."""
-    steps = 0.29 * (np.arange(13) % 8 < 4) + np.zeros((22, 1))
-    field = md.HeightField(steps, (0.113, 0.0905))
-    surface = mi.load_dict(md.bsdf_dict(
-        field, material="none", model="kirchhoff", coherence_width=9.5, wavelength=600.0
-    ))  # fmt: skip
-    directions = np.array([polar(theta, -78.0) for theta in (87.4, 88.5, 89.5)])
-    mean, error = furnace_in(surface, directions, 1, samples=40000)
-    assert np.all(mean <= 1.01 + 3.0 * error)
-
-
-def test_a_film_over_next_to_no_contrast_is_finite(mono, coarsely):
-    film = {"int_ior": 1.01, "ext_ior": 1.0, "film_ior": 1.05, "film_thickness": 50.0}
-    mean, _ = furnace_in(bsdf("rough", material=None, **film), np.array([polar(30.0, 0.0)]), 1)
-    assert 0.0 < mean.item() < 0.1
+def test_no_surface_sends_on_more_than_it_gets(name):
+    check_furnace(name)
 
 
 def test_nested_light_below_0_counts_as_0(mono, coarsely):
@@ -98,7 +72,7 @@ def test_nested_light_below_0_counts_as_0(mono, coarsely):
     assert np.array_equal(*values)
 
 
-@thorough
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "seed"), SEEDED)
 def test_white_furnace_of_one_wavelength(name, seed):
     """Mono variants make the scale at the one wavelength they have; gratings of a real metal."""
@@ -116,61 +90,11 @@ def test_white_furnace_of_one_wavelength(name, seed):
     assert short.mean() < 0.1
 
 
-@thorough
-def test_white_furnace_in_colours():
-    """RGB variants have one scale for each channel, the mean over its wavelengths."""
-    mi.set_variant("llvm_ad_rgb")
-    directions = random_directions(np.random.default_rng(3), 80.0)
-    mean, error = furnace_in(bsdf("sawtooth", coherence_width=15.0), directions, 3)
-    # a mean over wavelengths is not each wavelength's value
-    assert np.all(mean <= 1.0 + 4.0 * error + 5e-3)
-    assert np.median(mean) > 0.9
-
-
-@thorough
-@pytest.mark.parametrize(("name", "seed"), SEEDED)
-def test_white_furnace_at_random_directions(name, seed):
-    base = name == "sawtooth"
-    surface = white_pair(name, orientation=10.0 * seed) if base else bsdf(name)
-    assert_at_most_white(surface, seed)
-
-
-@thorough
-@pytest.mark.parametrize(("name", "base"), [("sinusoid", False), ("rough", True)])
-def test_white_furnace_in_its_own_shade(mono, name, base):
-    load = white_pair if base else bsdf
-    assert_at_most_white(load(name, shadowing="vcavity"))
-
-
-@thorough
-def test_white_furnace_of_the_measured_patch(mono, shared_afm):
-    patch = md.HeightField.load(
-        shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375
-    )
-    assert_at_most_white(mi.load_dict(md.bsdf_dict(patch, material="none")))
-
-
-@thorough
-def test_only_the_values_change_not_the_samples():
-    conserving, raw = bsdf("sinusoid"), bsdf("sinusoid", energy_conserving=False)
-    si = dr.zeros(mi.SurfaceInteraction3f, 1000)
-    si.wi = mi.Vector3f(polar(60.0, 10.0))
-    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
-    rng = mi.PCG32(1000)
-    numbers = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    context = mi.BSDFContext()
-    one, other = (b.sample(context, si, *numbers)[0] for b in (conserving, raw))
-    assert np.array_equal(np.array(one.wo), np.array(other.wo))
-    assert np.array_equal(np.array(one.pdf), np.array(other.pdf))
-    values = (np.array(b.eval(context, si, one.wo)) for b in (conserving, raw))
-    assert next(values).mean() < next(values).mean()
-
-
-@thorough
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_white_base_gets_what_the_model_does_not_reflect(mono, name):
     """White Lambertian beneath: a + T ∫T cosθ/π dω, with T = 1 − a of the furnace itself."""
-    alone, pair = bsdf(name, **DIELECTRIC), white_pair(name)
+    alone, pair = bsdf(name, **DIELECTRIC), bsdf(name, **DIELECTRIC, **WHITE)
     directions = np.array([polar(theta, 37.0) for theta in (0.0, 50.0, 75.0)])
     reflected, error = furnace_in(alone, directions, 0)
     total, other_error = furnace_in(pair, directions, 0)
@@ -185,17 +109,8 @@ def test_a_white_base_gets_what_the_model_does_not_reflect(mono, name):
     assert total.max() < 1.0
 
 
-@thorough
-def test_the_bound_follows_height_scale(mono):
-    surface = bsdf("sinusoid")
-    parameters = mi.traverse(surface)
-    parameters["height_scale"] = 1.3
-    parameters.update()
-    assert_at_most_white(surface)
-
-
-@thorough
-def test_a_film_s_scale_comes_and_goes_with_heights_of_a_texture(coarsely):
+@pytest.mark.thorough
+def test_a_film_s_scale_comes_and_goes_with_heights_of_a_texture(some_variant, coarsely):
     heights = bitmap(np.linspace(0.002, 0.2, 16).reshape(4, 4), filter_type="bilinear")
     given = {"material": "Al", "film_ior": 1.5, "film_thickness": 100.0, "coherence_width": 18.5}
     bsdf = mi.load_dict(md.bsdf_dict(steep_sinusoid(), height_scale=heights, **given))
@@ -204,3 +119,60 @@ def test_a_film_s_scale_comes_and_goes_with_heights_of_a_texture(coarsely):
     si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
     value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(polar(70.0, 190.0))))
     assert np.all(np.isfinite(value))
+
+
+FIELDS = {
+    "flat": md.HeightField(np.zeros((8, 8)), 8.0),
+    "50 nm": rough_patch((48, 48), (0.1, 0.1), 0.05, 1.0),
+    "5 nm": rough_patch((200, 200), (0.1, 0.1), 0.005, 1.0),
+}
+#: From above and from below.
+DIRECTIONS = np.array([polar(theta, 20.0) * [1, 1, side] for theta in (0, 45) for side in (1, -1)])
+
+
+@pytest.mark.usefixtures("some_variant", "coarsely")
+@pytest.mark.parametrize("kind", SIDES)
+@pytest.mark.parametrize(
+    ("field", "index", "width", "more", "within"),
+    [
+        # the table's tolerance
+        ("5 nm", 1.2, 65.0, {}, 5e-3),
+        ("flat", 1.06, 10.0, {}, 5e-3),
+        # orders interfere with one another, and in reflected light with order 0; the density of
+        # speckle is linear between samples of κ and of directions
+        ("50 nm", 1.3, 3.0, {"coherence": "patch"}, 2e-2),
+    ],
+)
+def test_all_light_is_sent_on_and_none_comes_from_nothing(kind, field, index, width, more, within):
+    parameters = {"int_ior": index, "ext_ior": 1.0, "coherence_width": width, **SIDES[kind], **more}
+    bsdf = mi.load_dict(md.bsdf_dict(FIELDS[field], "diffraction_dielectric", **parameters))
+    lam = [410.0, 500.0, 590.0, 690.0]
+    weights = sent_on(bsdf, DIRECTIONS, 0, lam, "Importance", samples=1 << 12)
+    # 4 standard errors of 64 trials
+    error = weights.std(axis=2) / 2.0**6
+    assert np.all(np.abs(weights.mean(axis=2) - 1.0) < 4.0 * error + within)
+    assert weights.max() < 20.0 or more  # one of ten samples or more is drawn from each side
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("kind", "theta", "lengths", "width"),
+    [
+        ("dielectric", 60.0, (2.5, 0.08), 20.0),
+        ("sheet", 75.0, (1.1, 0.06), 40.0),
+    ],
+)
+def test_conserved_both_sides_add_up_to_all_light(some_variant, kind, theta, lengths, width):
+    period, depth = lengths
+    size = {"periods": math.ceil(width / period), "pixels_per_period": math.ceil(period / 0.0895)}
+    grating = md.gratings.sinusoidal(period, depth, **size)
+    common = {"field": grating, "coherence_width": width, **SIDES[kind]}
+    light = {"wavelength": 550.0, "mode": "Importance", "samples": 1 << 15}
+    with energy_as(EnergySettings(side_wavelengths=3, azimuthal=36)):  # one at 550
+        (raw, error), (conserved, _) = (
+            furnace_in(both(energy_conserving=e, **common), polar(theta, 20.0)[None], 0, **light)
+            for e in (False, True)
+        )
+    # first order gains light, and a sheet loses the light beyond its critical angle
+    assert np.all(raw > 1.0 + 3 * error if kind == "dielectric" else raw < 0.99 - 3 * error)
+    assert np.all((0.98 - 3 * error < conserved) & (conserved < 1.001 + 3 * error))

@@ -1,4 +1,4 @@
-"""Pigment beneath a structure, and every named material as a surface."""
+"""Pigment and other BSDFs beneath a structure, and every named material as a surface."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.materials import METALS, TISSUES
-from mitsuba_diffraction.plugin.conductors import is_tabulated
+from mitsuba_diffraction.optics.materials import TISSUES
 from mitsuba_diffraction.plugin.pigment import pigment_bsdf, pigment_range
 from mitsuba_diffraction.reference import fresnel
+from mitsuba_diffraction.tables.directional import DirectionalTable
+from mitsuba_diffraction.tables.energy.conservation import Energy
+from mitsuba_diffraction.tables.energy.conserved import Reflector
+from tests.support.gentle import load, pairs
+from tests.support.lanes import evaluated, interaction, spectra, vectors
 
 FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
-
-
-def test_plain_names_are_tabulated_conductors(some_variant):
-    assert all(is_tabulated(symbol) for symbol in METALS.values())
 
 
 @pytest.mark.parametrize("name", TISSUES)
@@ -131,16 +131,6 @@ def test_colours_are_greys_numbers_and_names(some_variant):
         assert pigment_bsdf(text) is not None
 
 
-def test_a_picture_is_a_pigment_by_texture_coordinates(spectral, tmp_path):
-    file = tmp_path / "skin.png"
-    mi.util.write_bitmap(
-        str(file), mi.Bitmap(np.full((4, 4, 3), 0.5, np.float32)), write_async=False
-    )
-    assert "BitmapTexture" in str(pigment_bsdf(str(file)))
-    with pytest.raises(md.DiffractionError, match="does not exist"):
-        pigment_bsdf(str(tmp_path / "missing.png"))
-
-
 @pytest.mark.parametrize("named", ["brown.csv", "brown.csv:dark"])
 def test_a_scenes_pigment_lies_beside_it(some_variant, tmp_path, monkeypatch, named):
     (tmp_path / "brown.csv").write_text("wl,dark\n350,0.1\n800,0.4\n")
@@ -154,3 +144,29 @@ def test_a_scenes_pigment_lies_beside_it(some_variant, tmp_path, monkeypatch, na
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     assert mi.load_file(str(scene)) is not None
+
+
+def test_what_is_not_reflected_reaches_the_nested_bsdf(variant):
+    pigment = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.5}}
+    bare, coated = load(int_ior=1.5), load(int_ior=1.5, pigment=pigment)
+    wi, wo, lam = pairs()
+    context, si = mi.BSDFContext(), interaction(wi, lam[:, None])
+    eta = 1.5 / 1.000277
+    table = bare.table
+    glass = Reflector("small_slope", lambda w: np.full(len(w), 1.5 + 0j))
+    albedo = Energy(table, glass, table.wavelength_range).at(1.0).albedo
+    flat = fresnel.reflectance(np.cos(albedo.grid.theta), 1.5)[:, None]
+    excess = DirectionalTable(albedo.wavelengths, (albedo.values - flat).astype(np.float32))
+
+    def transmittance(directions):
+        theta, phi = np.arccos(directions[:, 2]), np.arctan2(directions[:, 1], directions[:, 0])
+        more = [excess.at(*one) for one in zip(theta, phi, lam, strict=True)]
+        return 1 - np.array(more) - fresnel.reflectance(directions[:, 2], eta)
+
+    t = transmittance(wi) * transmittance(wo)
+    beneath = spectra(mi.load_dict(pigment).eval(context, si, vectors(wo)))
+    expected = evaluated(bare, wi, wo, lam[:, None]) + t[:, None] * beneath
+    # an angle in single precision, on a grid of directions
+    assert evaluated(coated, wi, wo, lam[:, None]) == pytest.approx(expected, rel=1e-4)
+    # and it is not the flat interface's
+    assert np.abs(excess.values / flat).max() > 0.02

@@ -20,6 +20,7 @@ OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}
 THROUGH = {"plugin": "diffraction_dielectric"}
 PLACED = {"coherence": "surface", "uv_scale": 10.0}
 BOARD = {"type": "checkerboard"}
+CHITIN = 'layers = [["chitin", 0.09], ["1.33", 0.08]]\nrepeat = 6\n'
 
 
 def texels(*values: float, **more: Any) -> Callable[[], dict[str, Any]]:
@@ -49,6 +50,7 @@ REFUSED = [
     ({"material": "Unobtainium"}, "material='Unobtainium' is unknown"),
     ({"material": "1.5x"}, "material='1.5x': an index is n + ik"),
     ({"material": 0.0}, "material=0.0: an index is n + ik"),
+    ({"material": "AlSb"}, "302.4"),
     ({"material": "kerratin"}, "did you mean keratin?"),
     ({"int_ior": "melanin"}, "int_ior='melanin' absorbs light"),
     ({"material": "Al", "coat_ior": 1.4, "ext_ior": 1.33}, "leave ext_ior out"),
@@ -123,10 +125,7 @@ REFUSED = [
     (PLACED | {"uv_scale": 1e9}, "at most 1e+07"),
     ({"coherence": "surface", "world_scale": "10, 20"}, "must be one number of µm"),
     (PLACED | {"tiling": "hexagons"}, "choose one of periodic, random"),
-    (
-        {"coherence": "place"},
-        "coherence='place' is unknown; choose one of ensemble, patch, surface",
-    ),
+    ({"coherence": "place"}, "choose one of ensemble, patch, surface"),
     # factors that vary; functions make a texture of the variant
     ({"lateral_scale": 0.0}, "lateral_scale=0 must be at least 0.01"),
     ({"lateral_scale": math.nan}, "lateral_scale=nan must be a finite number"),
@@ -148,11 +147,40 @@ REFUSED = [
     ({"height_scale": texels(1.0, raw=False)}, "the bitmap is not raw"),
     ({"height_scale": BOARD}, "needs height_scale_max"),
     ({"height_scale": {"type": "mesh_attribute", "name": "vertex_worn"}}, "height_scale_max"),
-]
+    # layers, as text of their file
+    ({"layers": "spread = 0.1"}, "layers: expected pairs"),
+    ({"layers": 'layers = [["chitin", 0]]'}, "layer 1: thickness"),
+    ({"layers": 'layers = [["chitim", 0.1]]'}, "did you mean chitin"),
+    ({"layers": 'layers = [["none", 0.1]]'}, "perfect conductor is no layer"),
+    ({"layers": 'layers = [["1.5", 0.1]]\nrepeet = 2'}, "unknown key 'repeet'"),
+    ({"layers": 'layers = [["1.5", 0.1]]\nrepeat = 100'}, "interfere"),
+    ({"layers": CHITIN, "coat_ior": 1.5}, "cannot be combined"),
+    ({"layers": CHITIN, "film_ior": 1.5, "film_thickness": 100.0}, "cannot be combined"),
+    ({"layers": CHITIN, "material": "none"}, "cannot be combined"),
+    ({"layers": CHITIN, "model": "small_slope"}, "cannot be combined"),
+    ({"layers": 'layers = [["melanin", 0.1]]', "pigment": 0.5}, "absorb the light"),
+    # what transmits, beneath
+    *(({"beneath": nested}, "lets light through") for nested in (
+        {"type": "dielectric"}, {"type": "thindielectric"}, {"type": "roughdielectric"},
+        {"type": "null"}, {"type": "mask", "opacity": 0.5, "b": GREY},
+        {"type": "principled", "spec_trans": 0.5},
+        {"type": "blendbsdf", "weight": 0.3, "a": GREY, "b": {"type": "null"}},
+    )),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("parameters", "said"), REFUSED, ids=[f"{n}" for n in range(len(REFUSED))])
-def test_parameters_that_do_not_fit_are_one_clear_line(some_variant, parameters, said):
+def test_parameters_that_do_not_fit_are_one_clear_line(some_variant, tmp_path, parameters, said):
     given = {name: value() if callable(value) else value for name, value in parameters.items()}
+    if "layers" in given:
+        (tmp_path / "stack.toml").write_text(given["layers"])
+        given["layers"] = str(tmp_path / "stack.toml")
     given = {"coherence_width": 2.4} | given
     assert said in refusal(lambda: mi.load_dict(md.bsdf_dict(PATCH, **given)))
+
+
+def test_places_need_wavelengths():
+    mi.set_variant("scalar_rgb")
+    line = refusal(lambda: mi.load_dict(md.bsdf_dict(PATCH, **PLACED)))
+    assert "coherence='surface'" in line
+    assert "RGB" in line

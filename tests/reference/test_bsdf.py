@@ -10,23 +10,12 @@ from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
 from mitsuba_diffraction.reference import Sigmas, screen_power
-from tests.support.directions import polar, riemann_power, rough_patch, uniform_directions
+from tests.support.directions import polar, riemann_power, rough_patch
 
 #: Odd and even numbers of pixels, not square, nor are the pixels; 1.95 × 1.8 µm.
 SMALL = rough_patch((12, 15), (0.13, 0.15), 0.3)
 #: Well below 1/2 of the patch, so that several lobes overlap; σ in µm.
 SIGMA = 0.45
-
-
-def order_power(field: HeightField, frequency: tuple[float, float], kappa: float) -> float:
-    """|a|² of the order at a frequency, through a window so wide that its lobes do not overlap."""
-    screen = np.exp(1j * kappa * field.heights)
-    sigma = 3.0 * max(field.extent)  # neighbours weigh exp(−(3·2π)²) at most
-    power = screen_power(screen, field.pixel_size, *frequency, Sigmas(sigma, sigma), "ensemble")
-    return power / (4 * np.pi**2 * sigma**4)
-
-
-# ------------------------------------------------------------------------ the integral itself
 
 
 @pytest.mark.parametrize("coherence", reference.COHERENCES)
@@ -81,51 +70,6 @@ def test_an_ensemble_is_the_mean_over_all_places():
     assert values.mean() == pytest.approx(reference.brdf(SMALL, wi, wo, 550.0, **given)[0], 1e-9)
 
 
-@pytest.mark.parametrize("kappa", [0.3, 10.0, 50.0])
-def test_the_powers_of_all_orders_add_up_to_one(kappa):
-    ny, nx = SMALL.shape
-    lx, ly = SMALL.extent
-    total = sum(
-        order_power(SMALL, (2 * np.pi * jx / lx, 2 * np.pi * jy / ly), kappa)
-        for jx in range(-(nx // 2), (nx - 1) // 2 + 1)
-        for jy in range(-(ny // 2), (ny - 1) // 2 + 1)
-    )
-    assert total == pytest.approx(1.0, abs=1e-12)  # Parseval; rounding
-
-
-def test_nothing_is_known_beyond_the_pixels_nyquist_frequency():
-    screen = np.exp(10j * SMALL.heights)
-    nyquist = np.pi / SMALL.pixel_size[0]
-    inside, spilled, far = (
-        screen_power(
-            screen, SMALL.pixel_size, nyquist + n / SIGMA, 0.0, Sigmas(SIGMA, SIGMA), "ensemble"
-        )
-        for n in (-1.0, 1.0, 9.0)
-    )
-    assert inside > spilled > 0.0
-    assert far == 0.0
-
-
-def test_many_tiles_are_one():
-    tiled = HeightField(np.tile(SMALL.heights, (2, 3)), SMALL.pixel_size)
-    wi, wo, lam = polar(10, 80), polar(25, 250), 450.0
-    once = reference.brdf(SMALL, wi, wo, lam, coherence_width=2.0)
-    several = reference.brdf(tiled, wi, wo, lam, coherence_width=2.0)
-    assert several == pytest.approx(once, rel=1e-9)  # rounding
-
-
-def test_heights_may_have_any_zero():
-    lifted = HeightField(SMALL.heights + 5.0, SMALL.pixel_size)
-    wi, wo, lam = polar(10, 80), polar(25, 250), 450.0
-    for coherence in reference.COHERENCES:
-        before = reference.brdf(SMALL, wi, wo, lam, coherence_width=2.0, coherence=coherence)
-        after = reference.brdf(lifted, wi, wo, lam, coherence_width=2.0, coherence=coherence)
-        assert after == pytest.approx(before, rel=1e-9)  # phases of 130 rad lose two digits
-
-
-# ------------------------------------------------------------------------ gratings
-
-
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_facet_that_descends_towards_an_axis_reflects_towards_it(axis):
     # one wavelength of path at normal incidence: all light leaves in order +1
@@ -142,44 +86,11 @@ def test_a_facet_that_descends_towards_an_axis_reflects_towards_it(axis):
         assert lit > 1e4 * dark
 
 
-def test_peaks_obey_the_grating_equation():
-    period, lam, theta_i = 1.5, 0.55, 25.0
-    field = gratings.sinusoidal(period, 0.1, periods=20, pixels_per_period=16, rows=2)
-    for m in (-1, 1, 2):
-        expected = m * lam / period - np.sin(np.radians(theta_i))
-        sines = expected + np.linspace(-0.02, 0.02, 41)
-        wo = np.stack([sines, np.zeros_like(sines), np.sqrt(1 - sines**2)], axis=1)
-        f = reference.brdf(field, polar(theta_i), wo, 550.0, coherence_width=30.0)
-        peak = sines[(f * wo[:, 2]).argmax()]
-        # steps of 1e-3; the slope of the obliquity factor under a lobe of width 0.008 moves less
-        assert abs(peak - expected) < 1.5e-3
-
-
-# ------------------------------------------------------------------------ arguments and limits
-
-
-def test_arguments_broadcast():
-    wo = uniform_directions(5, np.random.default_rng(0))
-    assert reference.brdf(SMALL, polar(0), wo, 500.0).shape == (5,)
-    assert reference.brdf(SMALL, wo, polar(0), np.full(5, 500.0)).shape == (5,)
-    assert reference.brdf(SMALL, polar(0), polar(3), [400.0, 500.0]).shape == (2,)
-
-
 def test_an_open_patch_sends_nothing_beyond_its_pixels_frequencies():
     field = HeightField(np.random.default_rng(0).normal(0, 0.02, (8, 8)), 0.2, cut_out=True)
     wi, wo = [-0.390, -0.855, 0.342], [-0.120, -0.982, 0.146]
     values = reference.brdf(field, wi, wo, [385.0, 550.0])
     assert values[0] == 0.0 < values[1]
-
-
-def test_a_window_may_be_wider_than_any_table_s():
-    widths = (500.0, 5000.0)
-    narrow, wide = (
-        reference.brdf(SMALL, polar(0), polar(0), 550.0, coherence_width=width)[0]
-        for width in widths
-    )
-    # of order 0 alone: its lobe holds the same light in a solid angle of 1/width²
-    assert wide == pytest.approx(narrow * (widths[1] / widths[0]) ** 2, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -115,15 +115,16 @@ THROUGH: dict[str, dict[str, Any]] = {
     **{f"through a {name}": parameters for name, parameters in SIDES.items()},
     "through a narrower dielectric": {"lateral_scale": 0.7},
 }
-#: Mixes of two equal parts; the sheets of `make test-all` alone.
+#: Mixes; the sheets of `make test-all` alone.
 MIX, MIXED_SHEETS = "blended patches", "through blended sheets"
+#: Their parts, of which the first has a weight of 0.3.
+PARTS = {MIX: ("mirror", "dielectric"), MIXED_SHEETS: ("through a sheet", "through a sheet")}
 
 
 def made(kind: str, field: md.HeightField = PATCH, **more: Any) -> Any:
     """The BSDF of a kind that reflects or transmits, or a mix, in the variant that is set."""
-    if kind in (MIX, MIXED_SHEETS):
-        part = "mirror" if kind == MIX else "through a sheet"
-        one, two = (made(part, field, **more) for _ in range(2))
+    if kind in PARTS:
+        one, two = (made(part, field, **more) for part in PARTS[kind])
         return mi.load_dict({"type": "diffraction_mix", "one": one, "two": two, "weight_one": 0.3})
     if kind in THROUGH:
         return both(field, wavelength=600.0, **THROUGH[kind], **more)
@@ -136,7 +137,9 @@ def exact(kind: str, wi: Array, wo: Array, wavelengths: Array) -> Array | None:
 
     Radiance of what goes through is that of equal media on both sides.
     """
-    kind = {MIX: "mirror", MIXED_SHEETS: "through a sheet"}.get(kind, kind)
+    if kind in PARTS:
+        one, two = (exact(part, wi, wo, wavelengths) for part in PARTS[kind])
+        return 0.3 * one + 0.7 * two
     if kind in THROUGH:
         own = SLOPE | {"eta": 1.5} | THROUGH[kind]
         like, function = Kind({}, own, own.pop("lateral_scale", 1.0)), reference.btdf

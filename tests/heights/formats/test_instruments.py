@@ -44,15 +44,16 @@ def test_any_unit_of_length_will_do(tmp_path, unit, in_micrometres):
     assert field.pixel_size == pytest.approx((0.3 / NX, 0.3 / NY), rel=1e-12)
 
 
-def test_height_channel_is_found_among_others(tmp_path):
-    path = write(tmp_path, [("AmplitudeError", "nm"), ("ZSensor", "nm"), ("Phase", "deg")])
-    field = HeightField.load(path)
-    assert "'ZSensor', the only height channel" in field.history[0]
-
-
-def test_of_several_height_channels_the_first_is_taken_and_all_are_listed(tmp_path):
-    field = HeightField.load(write(tmp_path, [("Height", "nm"), ("ZSensor", "nm")]))
-    assert "'Height', the first height channel" in field.history[0]
+@pytest.mark.parametrize(
+    ("channels", "said"),
+    [
+        (["AmplitudeError", "ZSensor", "Phase"], "'ZSensor', the only height channel"),
+        (["Height", "ZSensor"], "'Height', the first height channel"),
+    ],
+)
+def test_the_first_height_channel_is_taken_and_all_are_listed(tmp_path, channels, said):
+    field = HeightField.load(write(tmp_path, [(name, "nm") for name in channels]))
+    assert said in field.history[0]
     assert "'ZSensor'" in field.history[0]
 
 
@@ -94,18 +95,6 @@ def test_unknown_options_name_the_choices(tmp_path, option, value):
     assert repr(value) in message
 
 
-def test_two_levels_at_once_are_told_how_to_be_two_treatments(tmp_path):
-    assert "HeightField.treated" in refusal(write(tmp_path), level="lines,quadratic")
-
-
-def test_gwyddion_files_are_read(tmp_path):
-    topography = surface_topography.Topography(np.arange(20.0).reshape(5, 4), (5, 8), unit="nm")
-    topography.to_gwy(str(tmp_path / "a.gwy"))
-    field = HeightField.load(tmp_path / "a.gwy")
-    assert field.heights == pytest.approx(np.arange(20).reshape(5, 4).T[::-1] * 1e-3, rel=1e-12)
-    assert field.pixel_size == pytest.approx((0.001, 0.002), rel=1e-12)
-
-
 def test_undefined_points_are_refused_or_filled(tmp_path):
     heights = np.ma.masked_equal(np.arange(20.0).reshape(5, 4), 6)
     surface_topography.Topography(heights, (5, 8), unit="nm").to_netcdf(str(tmp_path / "a.nc"))
@@ -134,20 +123,6 @@ def test_line_scans_and_scattered_points_are_refused(tmp_path):
     assert "grid" in refusal(tmp_path / "scattered.xyz")
 
 
-def test_a_channel_on_a_non_uniform_grid_is_refused(tmp_path, monkeypatch):
-    from SurfaceTopography.IO.DI import DIReader
-
-    class Scattered(DIReader):
-        @property
-        def channels(self):
-            for channel in super().channels:
-                channel._uniform = False
-            return super().channels
-
-    monkeypatch.setattr("SurfaceTopography.IO.open_topography", Scattered)
-    assert "not on a uniform grid" in refusal(write(tmp_path))
-
-
 def test_without_the_package_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "SurfaceTopography.IO", None)
     assert "(extra afm)" in refusal(write(tmp_path))
@@ -161,25 +136,6 @@ def test_unknown_files_list_what_is_known(tmp_path):
 @pytest.mark.parametrize("length", [1, 30, 400, 4000, 4097, 4096 + COUNTS.nbytes - 1])
 def test_truncated_instrument_files_are_refused(tmp_path, length):
     refusal(write(tmp_path, length=length))
-
-
-def test_nanoscope_file_needs_no_option(shared_afm):
-    path = shared_afm / "nanoscope-10um.di"
-    measured = HeightField.load(path, level="none")
-    assert measured.shape == (512, 512)
-    assert measured.extent == pytest.approx((10, 10), rel=1e-12)
-    # -25000 to 32760 counts, 1.5 V over 2^16 at 363.9 nm/V (its "Sens. ZsensSens")
-    assert measured.range == pytest.approx(0.4811, rel=1e-3)
-    assert "'ZSensor', the only height channel" in measured.history[0]
-
-    level = HeightField.load(path)
-    y, x = np.mgrid[:512, :512].reshape(2, -1)
-    plane = np.stack([x, y, np.ones_like(x)], -1)
-    removed = (measured.heights - level.heights).ravel()
-    fit = np.linalg.lstsq(plane, measured.heights.ravel(), rcond=None)[0]
-    # the least squares plane, but for its mean
-    tilt = plane[:, :2] @ fit[:2]
-    np.testing.assert_allclose(removed - removed.mean(), tilt - tilt.mean(), atol=1e-6)
 
 
 HEADS = [
@@ -205,19 +161,3 @@ def test_random_bytes_are_one_clear_line(tmp_path, head, tail, suffix):
                 HeightField.load(path, **options)
         except DiffractionError as error:
             assert "\n" not in str(error)
-
-
-def test_the_header_s_aspect_ratio_wins_over_the_library_and_is_said(tmp_path):
-    counts = np.round(3000 * np.sin(np.arange(24) / 3.0))[:, None] * np.ones(48)
-    square, strip = "10 10 ~m", "10 10 ~m\r\n\\Aspect Ratio: 2:1"
-    path = tmp_path / "strip.spm"
-    path.write_bytes(nanoscope(counts, scan_size=strip))
-    with pytest.warns(DiffractionWarning, match=r"10 x 5 µm .aspect ratio 2:1.* 10 x 10 µm"):
-        field = HeightField.load(path)
-    assert field.extent == pytest.approx((10.0, 5.0))
-    for stated in (square, "10 5 ~m"):
-        path.write_bytes(nanoscope(counts, scan_size=stated))
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", DiffractionWarning)
-            extent = HeightField.load(path, level="none").extent
-        assert extent == pytest.approx([float(word) for word in stated.split()[:2]])

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.heights.gratings import elaphe_like, xenopeltis_like
-from mitsuba_diffraction.heights.spectra import frequencies, height_spectrum, order_powers, profile
+from mitsuba_diffraction.heights.spectra import frequencies, height_spectrum, order_powers
 
 MAKERS = {"elaphe": elaphe_like, "xenopeltis": xenopeltis_like}
 PITCHES = {"elaphe": (1.03, 3.03), "xenopeltis": (0.6, 1.5)}  # µm: between columns, between rows
@@ -45,15 +43,6 @@ def column_pitch(field, pitch):
     line = height_spectrum(field)[np.abs(fy[:, 0]) < 0.15].sum(axis=0)
     near = (fx > 0.7 / pitch) & (fx < 1.35 / pitch)
     return line[near].sum() / (line * fx)[near].sum()
-
-
-def row_pitch(field, pitch, column):
-    """The same along y, where fingers' sides (higher frequencies along x) show the rows."""
-    fx, fy = frequencies(field)
-    sides = (np.abs(fx) > 1.5 / column) & (np.abs(fx) < 3 / column)
-    line, fy = height_spectrum(field)[:, sides].sum(axis=1), fy[:, 0]
-    near = (fy > 0.6 / pitch) & (fy < 1.5 / pitch)
-    return line[near].sum() / (line * fy)[near].sum()
 
 
 # --- what every patch has to be
@@ -98,37 +87,10 @@ def test_fingers_point_up(species):
 
 
 def test_pitches_are_those_asked_for(species, patch):
-    column, row = PITCHES[species]
+    column, _ = PITCHES[species]
     # the number of columns is whole, and faults add a few per cent; a single patch's estimate
     # scatters by 2 %
     assert column_pitch(patch, column) == pytest.approx(column, rel=0.05)
-    # 32.5 µm hold 11 or 22 rows: off by up to 4 % for want of a whole number, again 3 % of scatter
-    assert row_pitch(patch, row, column) == pytest.approx(row, rel=0.07)
-
-
-def test_fingers_scatter_across_themselves(patch, species):
-    """The light leaves mainly along x: rows along y are much weaker gratings."""
-    fx, fy = frequencies(patch)
-    column = PITCHES[species][0]
-    powers = order_powers(patch, 550.0)
-    first = np.hypot(fx, fy)
-    ring = (first > 0.7 / column) & (first < 1.35 / column)
-    across, along = ring & (np.abs(fx) > 2 * np.abs(fy)), ring & (np.abs(fy) > 2 * np.abs(fx))
-    assert powers[across].sum() > 10 * powers[along].sum()
-
-
-def test_xenopeltis_is_the_purer_grating():
-    """More of what it scatters into the first order's band lies in its upper tenth of orders."""
-
-    def purity(name):
-        field = MAKERS[name](extent=16.25, pixels=333, seed=1)
-        fx, fy = frequencies(field)
-        pitch = PITCHES[name][0]
-        band = (np.abs(fx) > 0.6 / pitch) & (np.abs(fx) < 1.4 / pitch) & (np.abs(fy) < 0.5 / pitch)
-        powers = np.sort(order_powers(field, 550.0)[band])
-        return powers[-powers.size // 10 :].sum() / powers.sum()
-
-    assert purity("xenopeltis") > purity("elaphe")
 
 
 def test_heights_are_proportional_to_depth(species):
@@ -143,43 +105,6 @@ def test_heights_are_proportional_to_depth(species):
 # --- side by side with the measured patch; seeds scatter by the figures given
 
 
-def test_pitches_are_the_measured_ones(whole, measured):
-    # single patches scatter by 1 %; 65 µm hold 21.4 of the measured rows, so 21: 2 % off
-    assert column_pitch(whole, 1.03) == pytest.approx(column_pitch(measured, 1.03), rel=0.04)
-    assert row_pitch(whole, 3.03, 1.03) == pytest.approx(row_pitch(measured, 3.03, 1.03), rel=0.06)
-
-
-def test_heights_are_distributed_as_measured(whole, measured):
-    # 42 nm against 46; seeds scatter between 38 and 61
-    assert whole.rms_height == pytest.approx(measured.rms_height, rel=0.25)
-    levels = np.linspace(0.005, 0.995, 199)
-    one, other = (np.quantile(f.heights - f.heights.mean(), levels) for f in (whole, measured))
-    # mean distance between quantiles (Wasserstein): 3 nm here; 3 to 15 over seeds, whose bending,
-    # a few waves, scatters; of 46 nm rms
-    assert np.abs(one - other).mean() < 0.008
-
-
-def test_slopes_are_as_measured(whole, measured):
-    # 0.29 against 0.33: the measured one has more saturated edges of dust and scan-line noise
-    assert whole.rms_slope == pytest.approx(measured.rms_slope, rel=0.12)
-    for axis in (0, 1):
-        one, other = (
-            np.diff(f.heights, axis=axis) / f.pixel_size[1 - axis] for f in (whole, measured)
-        )
-        levels = [0.02, 0.05, 0.25, 0.75, 0.95, 0.98]
-        # slopes up to 0.9; the measured ones are rounded to 0.03, by the 8 bits of the image
-        assert np.quantile(one, levels) == pytest.approx(np.quantile(other, levels), abs=0.12)
-
-
-@pytest.mark.parametrize(("direction", "limit"), [("all", 0.2), ("x", 0.22), ("y", 0.32)])
-def test_the_spectrum_is_as_measured(whole, measured, direction, limit):
-    edges = np.geomspace(0.1, 8, 25)
-    one, other = (profile(height_spectrum(f), f, edges, direction) for f in (whole, measured))
-    # mean |log₁₀ ratio| over five decades of power: 0.12 to 0.18 along x and 0.12 to 0.23 along y
-    # over seeds, where rings of few frequencies scatter by as much themselves
-    assert np.abs(np.log10(one / other)).mean() < limit
-
-
 @pytest.mark.parametrize("wavelength", [450.0, 550.0, 650.0])
 def test_light_is_thrown_as_by_the_measured_patch(whole, measured, wavelength):
     def shares(field):
@@ -191,17 +116,3 @@ def test_light_is_thrown_as_by_the_measured_patch(whole, measured, wavelength):
 
     # 3 % off; seeds scatter by 4 % in the mirror's share, by 1 % in the first order's
     assert shares(whole) == pytest.approx(shares(measured), rel=0.08)
-
-
-# --- any input
-
-
-def test_extremes_work():
-    for arguments in (
-        {"extent": 2.0, "pixels": 8},
-        {"extent": (2.0, 40.0), "pixels": (64, 8)},
-        {"extent": (40.0, 2.0), "pixels": (8, 64)},
-        {"extent": 150.0, "pixels": 16},
-    ):
-        for make in MAKERS.values():
-            assert math.isfinite(make(**arguments).rms_slope)

@@ -82,10 +82,17 @@ def test_gaps_outside_the_middle_do_not_matter_and_tilt_is_that_of_the_middle(tm
     assert [line.split()[0] for line in level.history] == ["cropped", "plane"]
 
 
-@pytest.mark.parametrize("bad", [0, -1, "wide", (1, 2, 3), float("nan"), True, ""])
-def test_no_size_is_named(bad):
-    with pytest.raises(DiffractionError, match=r"crop=.* must be a width or a pair"):
-        FIELD.treated(crop=bad)
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        *(("crop", bad) for bad in (0, -1, "wide", (1, 2, 3), float("nan"), True, "")),
+        *(("clip", bad) for bad in (0, -1, 0.5, float("nan"), float("inf"))),
+        ("level", "bow"),
+    ],
+)
+def test_a_treatment_of_no_sense_is_named(option, value):
+    with pytest.raises(DiffractionError, match=option):
+        FIELD.treated(**{option: value})
 
 
 RNG = np.random.default_rng(11)
@@ -134,42 +141,11 @@ def test_dust_is_clipped_and_counted():
     assert number_after("the furthest by", line) == pytest.approx(1.4, rel=0.02)
 
 
-def test_nothing_to_clip_changes_nothing_and_says_so():
-    for heights in (np.zeros((4, 4)), ROUGH):
-        same = clip_outliers(HeightField(heights, 0.1), 8)
-        assert np.array_equal(same.heights, heights)
-        assert same.history[0].startswith("no point is clipped: all are within 8 robust")
-
-
-@pytest.mark.parametrize("sigmas", [0, -1, 0.5, float("nan"), float("inf")])
-def test_clip_needs_a_sensible_width(sigmas):
-    with pytest.raises(DiffractionError, match="clip"):
-        HeightField(ROUGH, 0.1).treated(clip=sigmas)
-
-
 def test_clip_refuses_heights_without_a_deviation():
     steps = np.zeros((10, 10))
     steps[0] = 1
     with pytest.raises(DiffractionError, match="more than half"):
         clip_outliers(HeightField(steps, 0.1), 3)
-
-
-def test_a_patch_in_memory_is_treated_as_a_file_is(tmp_path):
-    heights = ROUGH + 0.003 * X + RNG.normal(size=(60, 1))
-    np.save(tmp_path / "scan.npy", heights)
-    asked = {"level": "lines", "clip": 4, "periodic": "exact"}
-    loaded = HeightField.load(tmp_path / "scan.npy", pixel_size=0.1, **asked)
-    treated = HeightField(heights, 0.1).treated(**asked)
-    assert np.array_equal(treated.heights, loaded.heights)
-    assert treated.history == loaded.history
-    assert len(treated.history) == 3
-
-
-def test_no_treatment_changes_nothing():
-    field = HeightField(ROUGH, 0.1)
-    assert np.array_equal(field.treated().heights, field.heights)
-    with pytest.raises(DiffractionError, match="one of 'auto', 'none', 'plane'"):
-        field.treated(level="bow")
 
 
 def gaps(heights, seed=0):
@@ -206,20 +182,6 @@ def test_harmonic_continues_a_plane_through_inner_gaps(side, radius):
     filled, _ = fill_missing(holed, "harmonic", "patch")
     # a plane is harmonic; conjugate gradients stop at 1e-9 of the heights' norm, 1e3
     assert filled == pytest.approx(plane, abs=1e-5)
-
-
-def test_nearest_takes_the_nearest_height():
-    row = np.array([1.0, 1.0, np.nan, np.nan, np.nan, 2.0, 2.0])
-    filled, _ = fill_missing(np.tile(row, (2, 1)), "nearest", "patch")
-    assert filled[:, [2, 4]].tolist() == [[1, 2], [1, 2]]
-    assert set(filled[:, 3]) <= {1, 2}
-
-
-def test_complete_heights_pass_untouched():
-    whole = np.ones((3, 4))
-    filled, line = fill_missing(whole, None, "patch")
-    assert filled is whole
-    assert line == ""
 
 
 @pytest.mark.parametrize(

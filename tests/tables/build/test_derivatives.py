@@ -56,11 +56,3 @@ def test_both_ways_are_adjoint(name):
     weights = [random.normal(size=part.shape) for part in forward]
     total = sum(float(np.sum(w * part)) for w, part in zip(weights, forward, strict=True))
     assert np.sum(linear.backward(*weights) * change) == pytest.approx(total, rel=1e-10)
-
-
-def test_a_constant_changes_nothing():
-    patch = PATCHES["fine"]
-    linear = HeightDerivatives(table_of(patch, patch.heights), patch.heights)
-    bins, order_0 = linear.forward(np.ones(patch.shape))
-    assert np.abs(bins).max() < 1e-9
-    assert np.abs(order_0).max() < 1e-9

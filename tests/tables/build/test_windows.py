@@ -1,4 +1,4 @@
-"""Scans are seen through windows: hues, brightness, sums, and the mean within its own error."""
+"""Scans seen through windows, and tables that end at a frequency: exact within, dark beyond."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import pickle
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
-from mitsuba_diffraction.heights.coherence import LOOKUP, resolved, window_corners
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
+from mitsuba_diffraction.heights.coherence import LOOKUP, resolved
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build import powers as powers_module
 from mitsuba_diffraction.tables.build import screens as module
 from mitsuba_diffraction.tables.build.screens import Screens
+from tests.support.directions import rough_patch
 from tests.support.scans import PIXEL, SETTINGS, rough
 
 #: Width of a window, µm.
@@ -57,17 +58,6 @@ def test_a_grating_s_order_is_where_its_equation_says_however_many_periods_the_s
     assert width == pytest.approx(expected, rel=0.15)
 
 
-def test_powers_of_all_orders_add_up_to_1():
-    patches = Screens([sinusoid(10.5, 20.0)], 10.0)
-    ny, nx = patches.tile
-    for kappa in (1e-3, 0.3, 12.0, 40.0):
-        powers = np.abs(patches.spectrum(0, (nx // 2, ny // 2), double=True).of_phase(kappa)) ** 2
-        assert np.sum(powers) == pytest.approx(1.0, abs=1e-9)
-        powers[ny // 2, nx // 2] = 0.0
-        # but for the curvature about order 0, whose own bin has no power of other orders
-        assert np.sum(patches.sharpened(powers)) == pytest.approx(powers.sum(), rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("side", "light", "window", "count"),
     [
@@ -82,14 +72,6 @@ def test_the_width_of_windows_follows_the_scan_and_the_light(side, light, window
     assert settings.width == pytest.approx(window)
     assert settings.lookup_width == pytest.approx(LOOKUP * window)
     assert len(Screens([field], settings.width)) == count
-
-
-def test_a_scan_that_is_not_square_has_windows_along_its_longer_side():
-    field = HeightField(rough(120)[:60], PIXEL, cut_out=True)
-    table = DiffractionTable.build(field, **{**SETTINGS, "coherence_width": 65.0})
-    assert table.window_width == pytest.approx(6.0)
-    assert table.source["windows"]["along x, y"] == [(3, 1)]
-    assert table.source["windows"]["extent"] == pytest.approx([6.0, 6.0])
 
 
 def test_windows_agree_with_the_whole_scan_within_their_standard_error(scan, table):
@@ -121,64 +103,11 @@ def test_several_windows_are_levelled_each_and_a_single_one_is_as_it_is():
     np.testing.assert_array_equal(alone.heights, waved.heights)
 
 
-@pytest.mark.parametrize("count", [2, 7])
-def test_the_mean_over_noise_scatters_as_welch_has_it(count):
-    length = 64
-    windows = Screens([HeightField(rough(length * (count + 1) // 2), 1.0, cut_out=True)], 64.0)
-    rng = np.random.default_rng(2)
-    ny, nx = windows.scans[0].shape
-    corners = [(top, left) for _, top, left in windows._places]
-    taper, draws = windows.taper, []
-    for _ in range(300):
-        noise = rng.standard_normal((ny, nx)) + 1j * rng.standard_normal((ny, nx))
-        parts = [taper * noise[y : y + length, x : x + length] for y, x in corners]
-        powers = np.abs([np.fft.fft2(part)[5:25:4, 5:25:4] for part in parts]) ** 2
-        draws.append((powers.mean(axis=0), powers[0]))
-    mean, first = np.moveaxis(np.array(draws), 1, 0)
-    # 300 draws of 25 bins: the ratio of two variances scatters by 3 %
-    ratio = mean.var(axis=0).mean() / first.var(axis=0).mean()
-    assert ratio == pytest.approx(windows.variance_factor, rel=0.15)
-
-
-def test_windows_of_a_large_grid_are_those_of_one_colour_of_a_chessboard():
-    assert window_corners([0], [0, 5, 9]) == [(0, 0), (0, 5), (0, 9)]
-    assert window_corners([0, 4], [0, 4]) == [(0, 0), (0, 4), (4, 0), (4, 4)]
-    assert window_corners([0, 4, 8], [0, 4, 8]) == [(0, 0), (0, 8), (4, 4), (8, 0), (8, 8)]
-
-
-def test_memory_is_of_one_window_for_each_thread(monkeypatch):
-    scan = HeightField(rough(240), PIXEL, cut_out=True)
-    alive = []
-    made = Screens.__getitem__
-
-    def counted(self, n):
-        result = made(self, n)
-        alive.append(result.heights.size)
-        return result
-
-    monkeypatch.setattr(Screens, "__getitem__", counted)
-    found = DiffractionTable.build(scan, windows=8.0, **{**SETTINGS, "coherence_width": 65.0})
-    assert found.source["windows"]["number"] == 13
-    assert max(alive) <= 0.25 * scan.heights.size
-
-
 def test_the_table_is_the_same_with_any_number_of_threads(monkeypatch, scan, table):
     monkeypatch.setattr(module.Screens, "batches", lambda self: [self])
     monkeypatch.setattr(powers_module, "_MOST_THREADS", 1)
     again = DiffractionTable.build(scan, **SETTINGS)
     np.testing.assert_array_equal(again.coefficients, table.coefficients)
-
-
-def test_a_grating_narrow_along_one_axis_has_windows_along_the_other():
-    grating = gratings.sinusoidal(period=1.6, depth=0.05, periods=40, pixels_per_period=16, rows=4)
-    table = DiffractionTable.build(grating, windows=6.0, **SETTINGS)
-    (along_x, along_y) = table.source["windows"]["along x, y"][0]
-    assert along_x > 5
-    assert along_y == 1
-    order = 2 * np.pi / 1.6
-    first = table.window_sum(order, 0.0, 12.0)
-    # what is between orders is below the tolerance, 2 %
-    assert first > 50 * table.window_sum(0.5 * order, 0.0, 12.0)
 
 
 def test_several_scans_of_other_sizes_make_one_table():
@@ -236,3 +165,73 @@ def test_batches_are_of_neighbours_and_hold_every_window_once(scan, monkeypatch)
     assert max(batch.scans[0].heights.size for batch in sent) <= 3.01 * ny * nx
     found = [batch[n].heights for batch in sent for n in range(len(batch))]
     np.testing.assert_array_equal(found, [one.heights for one in whole])
+
+
+#: 19.2 µm wide; Nyquist's frequency is 10.5 rad/µm.
+PATCH = rough_patch((64, 64), (0.3, 0.3), 0.25, correlation=0.2)
+BROAD, LIMIT = 18.0, (8.0, 3.0)
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """A table of all that light can probe."""
+    return DiffractionTable.build(PATCH, coherence_width=BROAD)
+
+
+@pytest.fixture(scope="module", params=["ensemble", "patch"])
+def limited(request):
+    """A table that ends at `LIMIT`, for heights as they are."""
+    return DiffractionTable.build(
+        PATCH,
+        coherence_width=BROAD,
+        coherence=request.param,
+        frequency_limit=LIMIT,
+        height_scale_max=1.0,
+    )
+
+
+def frequencies(count, farthest):
+    """Random frequencies (n,), (n,) in an ellipse, in units of the limits."""
+    rng = np.random.default_rng(0)
+    angle, radius = rng.uniform(0, 2 * np.pi, count), farthest * np.sqrt(rng.uniform(0, 1, count))
+    return LIMIT[0] * radius * np.cos(angle), LIMIT[1] * radius * np.sin(angle)
+
+
+def test_within_the_limit_the_tolerance_is_met(limited):
+    assert limited.largest_error <= 1e-3
+    full = DiffractionTable.build(
+        PATCH, coherence_width=BROAD, coherence=limited.coherence, tolerance=1e-4
+    )
+    x, y = frequencies(4000, 1.0)
+    assert limited.covers(x, y, 30.0).all()
+    for kappa in (1.0, 8.0, 30.0):
+        exact = full.window_sum(x, y, kappa)
+        difference = np.abs(limited.window_sum(x, y, kappa) - exact)
+        # Its own tolerance, and that of what it is compared with
+        assert difference.sum() <= 1.1e-3 * exact.sum()
+
+
+def test_beyond_the_limit_it_is_dark_and_never_guessed(limited):
+    x, y = frequencies(2000, 2.0)
+    beyond = np.hypot(x / LIMIT[0], y / LIMIT[1]) > 1.0 + 1e-5
+    assert np.all(limited.window_sum(x[beyond], y[beyond], 20.0) == 0.0)
+    # as in any table: what its wavelengths and heights cannot probe is not a number
+    assert np.isnan(limited.window_sum(limited.q_limit * 1.01, 0.0, 20.0))
+    assert np.isnan(limited.window_sum(1.0, 1.0, limited.q_limit * 1.01))
+
+
+def test_it_takes_less_memory(whole, limited):
+    components = limited.coefficients.shape[3]
+    assert limited.nbytes < 0.5 * components * whole.nbytes
+
+
+@pytest.mark.parametrize("limit", [-1.0, (1.0, 0.0), float("nan"), (1.0, 2.0, 3.0), "none"])
+def test_a_limit_of_nothing_is_refused(limit):
+    with pytest.raises(DiffractionError, match=r"frequency_limit=.* must be a positive number"):
+        DiffractionTable.build(PATCH, coherence_width=BROAD, frequency_limit=limit)
+
+
+def test_a_limit_beyond_what_light_can_probe_is_none(whole):
+    table = DiffractionTable.build(PATCH, coherence_width=BROAD, frequency_limit=1e3)
+    assert not table.limited
+    assert table.digest() == whole.digest()

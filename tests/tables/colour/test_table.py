@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, DiffractionWarning, HeightField
-from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
+from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.tables.colour import table as colour_table
 from mitsuba_diffraction.tables.colour.table import ColourTable, cached_colours
 from tests.support.directions import Array, rough_patch
@@ -67,45 +67,6 @@ def test_colours_are_the_integral_over_wavelengths(case: str) -> None:
     for part, tolerance in ((away, 0.02), (~away, 2e-3)):
         error = np.abs(found - expected)[part].sum() / np.abs(expected)[part].sum()
         assert error < tolerance
-
-
-@pytest.mark.thorough
-def test_heights_scaled_alike_have_the_same_colours() -> None:
-    heights = rough_patch((40, 48), (0.2, 0.25), 0.3)
-    taller = HeightField(1.4 * heights.heights, heights.pixel_size)
-    tables = [DiffractionTable.build(h, coherence_width=WIDTH) for h in (heights, taller)]
-    u, v, w = directions(200)
-    short, tall = (ColourTable.build(table) for table in tables)
-    found, expected = short.colour(u, v, 1.4 * w), tall.colour(u, v, w)
-    assert np.abs(found - expected).sum() < 0.01 * np.abs(expected).sum()  # two series in z
-
-
-@pytest.mark.thorough
-def test_a_mirror_reflects_white() -> None:
-    table = DiffractionTable.build(HeightField(np.zeros((8, 8)), 0.5), coherence_width=65.0)
-    colours = ColourTable.build(table)
-    radius = np.linspace(0.0, colours.radius_end, 4000)
-    found = colours.colour(radius, 0.0 * radius, np.full(radius.shape, 2.0))
-    ring = 2.0 * np.pi * radius[:, None] * found
-    albedo = 4.0 * np.pi * table.sigma**2 * np.trapezoid(ring, radius, axis=0)
-    assert albedo == pytest.approx(np.ones(3), abs=1e-3)  # linear between 256 radii
-
-
-@pytest.mark.thorough
-def test_the_map_of_a_patch_has_the_spectral_colours() -> None:
-    table = DiffractionTable.build(rough_patch((48, 48), (0.25, 0.25), 0.3), coherence_width=WIDTH)
-    x = np.linspace(-0.97, 0.97, 33)
-    x, y = (a.ravel() for a in np.meshgrid(x, x))
-    x, y = x[x**2 + y**2 < 0.95], y[x**2 + y**2 < 0.95]
-    cos_o = np.sqrt(1.0 - x**2 - y**2)
-    w = 1.0 + cos_o  # light from the normal
-    factor = ((1.0 + cos_o) / w) ** 2 / cos_o
-    truth, found = integral(table, x, y, w), ColourTable.build(table).colour(x, y, w)
-    difference = delta_e(factor[:, None] * truth, factor[:, None] * found)
-    difference = difference[np.isfinite(difference)]
-    assert difference.size > 400
-    assert difference.mean() <= 1.0
-    assert np.percentile(difference, 99) <= 3.0
 
 
 @pytest.mark.thorough

@@ -8,12 +8,13 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.reference import fresnel
+from mitsuba_diffraction.optics.blend import ScaleRoughness
+from mitsuba_diffraction.optics.paths import Path
+from mitsuba_diffraction.tables.directional import LAST_ANGLE, DirectionGrid
 from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
-from mitsuba_diffraction.tables.energy.conserved import Reflector
+from mitsuba_diffraction.tables.energy.conserved import Reflector, Transmitter
+from mitsuba_diffraction.tables.energy.gain import PathGain
 from mitsuba_diffraction.tables.energy.scaling import parallel, scaled
-from mitsuba_diffraction.tables.energy.settings import EnergySettings
-from tests.support.coarse import energy_as
 from tests.support.directions import polar, rough_patch
 from tests.support.furnace import isotropic
 
@@ -70,15 +71,6 @@ def test_a_gratings_albedo_is_the_sum_of_its_efficiencies(tables, material, thet
     assert raw_albedo(tables["grating"], theta, phi, wavelength, material) == pytest.approx(
         total, rel=0.01
     )
-
-
-def test_a_flat_surface_reflects_what_fresnel_says():
-    table = md.DiffractionTable.build(md.HeightField(np.zeros((8, 8)), 8.0))
-    for material, (_, index) in MATERIALS.items():
-        for theta in (0.0, 45.0, 75.0):
-            exact = fresnel.reflectance(np.cos(np.radians(theta)), index or np.inf)
-            # the lobe's width at 75°, and bilinear tables
-            assert raw_albedo(table, theta, 0.0, 550, material) == pytest.approx(exact, rel=4e-3)
 
 
 def integral(table, theta, phi, wavelength):
@@ -168,31 +160,12 @@ def test_a_mirror_loses_less_than_its_roughness_scatters(rms):
     np.testing.assert_allclose(found, 1.0, atol=5e-4 + (4.0 * np.pi * rms / 0.36) ** 2)
 
 
-def test_a_gentle_metal_gains_nothing_and_nothing_is_taken():
-    gentle = md.gratings.sinusoidal(2.5, 0.04, periods=1, pixels_per_period=32, rows=8)
-    table = md.DiffractionTable.build(gentle)
-    metal = SurfaceEnergy(table, reflector("small_slope", ALUMINIUM))
-    found = metal.conservation((550.0, 550.0))
-    assert found.scale is None
-
-
 def conserved(surface, wavelengths, theta, phi):
     """Albedos raw and conserved, (wavelengths, directions)."""
     scales = surface.conservation((min(wavelengths), max(wavelengths)))
     assert scales.scale is not None
     pairs = [surface.albedos(scales, theta, phi, wavelength) for wavelength in wavelengths]
     return (np.stack(part)[:, 0] for part in zip(*pairs, strict=True))
-
-
-def test_a_rough_surface_keeps_what_it_may(tables):
-    mirror = SurfaceEnergy(tables["rough"], reflector("kirchhoff", None))
-    theta, phi = np.radians([3.0, 31.0, 52.0, 68.0, 77.0]), np.radians([5.0, 72.0, 201.0, 333.0])
-    raw, kept = conserved(mirror, [550.0], theta, phi)
-    assert raw.max() > 1.01  # or the test would say little
-    assert kept.max() <= 1.005
-    # an aim of 0.992, and what lies between the grid's directions
-    assert np.all(kept >= np.minimum(raw, 1.0) * 0.97)
-    assert np.all(kept <= raw * 1.01)
 
 
 @pytest.mark.parametrize("material", ["aluminium", "perfect"])
@@ -206,14 +179,6 @@ def test_a_grating_gains_nothing_between_nodes_either(tables, material):
     # spikes are as narrow as a lobe, half a degree, and looked at in the middle wavelength alone
     assert kept.max() <= (1.005 if material == "aluminium" else 1.02)
     assert np.mean(kept / np.minimum(raw, 1.0)) > 0.95
-
-
-def test_coarser_settings_take_less_work_and_are_another_record(tables):
-    with energy_as(EnergySettings(polar=12, azimuthal=16, wavelengths=2, rings=12)):
-        mirror = SurfaceEnergy(tables["rough"], reflector("kirchhoff", None))
-        scale = mirror.conservation((400.0, 700.0)).scale
-    assert scale is not None
-    assert scale.values.shape == (2, 13, 16)
 
 
 def test_sums_below_zero_leave_the_scale_a_number():
@@ -232,3 +197,81 @@ def test_threads_start_no_threads_of_their_own():
     with threadpool_limits(2, "blas"):
         assert parallel(most, range(3)) == [1, 1, 1]
         assert most() == 2
+
+
+PATCH = rough_patch((40, 44), (0.09, 0.09), 0.1)
+
+
+def gain_of(path):
+    roughness = ScaleRoughness.from_heights(PATCH.heights, PATCH.pixel_size)
+    return PathGain(path, roughness.table(50.0), 11.0, 1.0)
+
+
+PATHS = [
+    pytest.param(path, id=f"{name} {path.came.number}-{path.left.number}")
+    for name, thin in (("surface", False), ("sheet", True))
+    for path in Transmitter(1.5, "small_slope", thin).paths(np.ones(1), 1e-3)[0]
+    if path.index is not None  # the flat side of a sheet has no table
+] + [pytest.param(Path(0.9 + 6.0j, "small_slope"), id="metal")]
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_tables_hold_the_boundary_s_gain_in_either_order_of_directions(path):
+    gain = gain_of(path)
+    rng = np.random.default_rng(4)
+    cos_i, cos_o = rng.uniform(0.4, 0.98, (2, 400))
+    turn = rng.uniform(-np.pi, np.pi, 400)
+    expected, tabulated = (
+        gain.exact(cos_i, cos_o, np.cos(turn)),
+        gain(cos_i, np.arange(400), cos_o, turn),
+    )
+    near = path.tangential(cos_i, cos_o, np.cos(turn)) < 1.9
+    # linear between 37 × 37 × 25 nodes, within 73 × 73 × 25; where w is small, 1/w² is not linear
+    away = near & (path.width(cos_i, cos_o) > 0.2)
+    assert np.count_nonzero(away) > 150
+    error = np.abs(tabulated - expected)[away].sum() / expected[away].sum()
+    # 1.2 % where total reflection begins at a kink, 1.6 % within with 37 × 37 × 25 nodes
+    assert error < 0.014
+
+
+@pytest.mark.parametrize("index", [1.5, 2.46])
+def test_tables_hold_the_root_at_a_critical_angle(index):
+    """Light is let through towards directions within 3° of the critical angle."""
+    gain = gain_of(Transmitter(index, "small_slope", False).paths(np.array([550.0]), 0.05)[0][1])
+    critical = np.arcsin(1.0 / index)
+    cos_o = np.cos(np.linspace(critical - 0.05, critical + 0.05, 41))
+    cos_i, row = np.array([np.cos(1.1)]), np.zeros(41, int)
+    expected = gain.exact(cos_i, cos_o, np.full(41, -0.95))
+    tabulated = gain(cos_i, row, cos_o, np.full(41, np.arccos(-0.95)))
+    # up to 0.11 where nodes were the same for all sides
+    np.testing.assert_allclose(tabulated, expected, rtol=0.02)
+
+
+def test_orders_that_do_not_overlap_send_on_the_light_of_an_ensemble() -> None:
+    """Under a window of many periods: a few lobes of a degree, which a smooth density misses."""
+    heights = 0.3 * np.random.default_rng(4).random((8, 6))
+    field, mirror = (
+        md.HeightField(heights, (0.25, 0.17), periodic=True),
+        Reflector("kirchhoff", lambda lam: None),
+    )
+    theta, phi = np.radians([40.0, 70.0]), np.radians([-53.0, 10.0, 14.0])
+    albedos = []
+    for coherence in ("ensemble", "patch"):
+        table = md.DiffractionTable.build(field, coherence_width=25.0, coherence=coherence)
+        surface = SurfaceEnergy(table, mirror)
+        albedos.append(surface.albedos(Conservation(), theta, phi, 600.0)[0])
+    # both tables' tolerance; a density had up to 13 % more light
+    np.testing.assert_allclose(albedos[1], albedos[0], rtol=0.02)
+
+
+def test_the_grid_interpolates_what_is_linear_and_goes_round():
+    grid = DirectionGrid(10, 12)
+    assert grid.theta[0] == 0.0
+    assert grid.theta[-1] == pytest.approx(LAST_ANGLE)
+    rows = np.arange(11.0, dtype=np.float32)[:, None] + np.zeros((1, 12), np.float32)
+    theta = np.radians([0.0, 10.0, 47.0, 89.9])
+    found = grid.interpolation(theta, np.radians([-30.0, 0.0, 359.0, 725.0]))(rows)
+    assert found == pytest.approx(grid.row(theta), abs=1e-5)
+    round_ = np.cos(grid.phi).astype(np.float32) + np.zeros((11, 1), np.float32)
+    middle = grid.interpolation(0.5, np.radians([345.0, -15.0]))(round_)
+    assert middle == pytest.approx(0.5 * (1.0 + np.cos(np.radians(30.0))), abs=1e-6)

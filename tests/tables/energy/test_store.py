@@ -49,37 +49,6 @@ def energy(index: complex = 1.5, scale: float = 1.5) -> Energy:
     return Energy(replace(table(scale)), material, (400.0, 700.0))
 
 
-@pytest.mark.parametrize("most", [1.5, 1.43, 0.1])
-def test_two_nodes_are_around_each_height_scale(most):
-    surface = energy(scale=most)
-    for height_scale in most * np.linspace(0.01, 1.0, 23):
-        low, high = surface.nodes(height_scale, height_scale)
-        assert low <= max(height_scale * (1 + 1e-5), 1e-3)
-        assert height_scale <= high * (1 + 1e-4)  # nodes catch what is that near
-        assert high <= most
-
-
-def test_one_node_does_at_the_scale_of_most_scenes():
-    assert energy().nodes(1.0, 1.0) == [1.0, 1.0]
-    single = float(np.float32(1.0 + 1e-6))
-    assert energy().nodes(single, single) == [1.0, 1.0]
-
-
-def test_a_range_of_height_scales_has_even_nodes_around_all():
-    nodes = energy(scale=4.0).nodes(0.3, 2.1)
-    assert nodes[0] <= 0.3
-    assert nodes[-1] >= 2.1
-    assert len(nodes) > 4
-    assert np.ptp(np.diff(nodes)) < 1e-12
-
-
-@pytest.mark.parametrize("height_scale", [1.0, 1.5])
-def test_for_derivatives_there_are_always_two(height_scale):
-    low, high = energy().nodes(height_scale, height_scale, interval=True)
-    assert low < high
-    assert low <= height_scale <= high
-
-
 @pytest.mark.parametrize("height_scale", [0.25, 1.0])
 def test_each_is_computed_once_and_kept_on_disk(computed, height_scale):
     first = energy().at(height_scale)
@@ -122,3 +91,13 @@ def test_what_a_table_keeps_for_the_next_material_changes_no_values() -> None:
             seen.append(albedo(table, *asked))
             assert np.array_equal(seen[-1], albedo(energy().table, *asked))
     assert not any(np.array_equal(seen[0], other) for other in seen[1:])
+
+
+@pytest.mark.parametrize("most", [1.5, 1.43, 0.1])
+def test_two_nodes_are_around_each_height_scale(most):
+    surface = energy(scale=most)
+    for height_scale in most * np.linspace(0.01, 1.0, 23):
+        low, high = surface.nodes(height_scale, height_scale)
+        assert low <= max(height_scale * (1 + 1e-5), 1e-3)
+        assert height_scale <= high * (1 + 1e-4)  # nodes catch what is that near
+        assert high <= most
