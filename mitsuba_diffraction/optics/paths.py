@@ -12,6 +12,7 @@ symmetric.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,9 +111,23 @@ class Path:
         return min(sine, 1.0)
 
     @property
-    def sign(self) -> int:
-        """Sign of the orders' frequencies: seen from below, heights are turned over."""
-        return -1 if self.came.number or self.left.number else 1
+    def signs(self) -> tuple[int, ...]:
+        """Signs of the orders' frequencies over q: −1 where the heights seem turned over.
+
+        Light that is reflected below sees the heights from behind. Light that is let through has
+        the sign of q above less q below, and either sign where the index is below √2.
+        """
+        if not self.let_through:
+            return (-1,) if self.came.number else (1,)
+        return (-1, 1) if self._real < math.sqrt(2.0) else (-1,)
+
+    def sign(self, cos_i: Real, cos_o: Real) -> Real:
+        """Return which of `signs` the light has, in float32."""
+        if len(self.signs) == 1:
+            return np.full(np.broadcast(cos_i, cos_o).shape, self.signs[0], np.float32)
+        q_i, q_o = self.came.normal(cos_i), self.left.normal(cos_o)
+        above, below = (q_o, q_i) if self.came.number else (q_i, q_o)
+        return np.where(below > above, np.float32(-1.0), np.float32(1.0))
 
     def width(self, cos_i: Real, cos_o: Real) -> Real:
         """Return w."""

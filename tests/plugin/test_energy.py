@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.tables.energy.conservation import Conservation, SurfaceEnergy
+from mitsuba_diffraction.tables.energy.conserved import Transmitter
 from mitsuba_diffraction.tables.energy.settings import EnergySettings
 from tests.support.coarse import energy_as
 from tests.support.directions import polar, rough_patch, uniform_directions
@@ -62,6 +64,30 @@ def test_scales_that_come_and_go_with_the_heights_load_and_update(some_variant, 
 )
 def test_no_surface_sends_on_more_than_it_gets(name):
     check_furnace(name)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_sums_are_integrals_where_light_leaves_flatter_than_it_came(mono, side):
+    """q above is larger than q below then: κ < 0, and the heights seem turned over."""
+    heights = 0.3 * np.tile(np.arange(24) / 24.0, (37, 1))
+    field, index = md.HeightField(heights, (0.079, 0.0466)), 1.07
+    narrow = {"coherence": "patch", "coherence_width": 0.71}
+    sheet = {"plugin": "diffraction_dielectric", "thin": True, "int_ior": index, "ext_ior": 1.0}
+    surface = mi.load_dict(md.bsdf_dict(
+        field, wavelength=483.0, energy_conserving=False, **sheet, **narrow
+    ))  # fmt: skip
+    cosine = ((np.arange(256) + 0.5) / 256) ** 2
+    cosine, turn = np.meshgrid(cosine, (np.arange(256) + 0.5) * (np.pi / 128))
+    sine = np.sqrt(1.0 - cosine**2)
+    areas = np.sqrt(cosine).ravel() * (np.pi / 128**2)  # dωo by midpoints
+    wi, total = polar(60.0, 17.0) * [1.0, 1.0, side], 0.0
+    for z in (cosine, -cosine):
+        wo = np.stack([sine * np.cos(turn), sine * np.sin(turn), z], axis=-1).reshape(-1, 3)
+        total += (np.ravel(evaluated(surface, wi, wo, 483.0)) * areas).sum()
+    table = md.DiffractionTable.build(field, height_scale_max=index, **narrow)
+    sums = SurfaceEnergy(table, Transmitter(index, "small_slope", True))
+    found, _ = sums.albedos(Conservation(), np.radians([60.0]), np.radians([17.0]), 483.0)
+    assert found[int(side < 0.0)].item() == pytest.approx(total, rel=0.01)  # as of narrow windows
 
 
 def test_nested_light_below_0_counts_as_0(mono, coarsely):

@@ -143,6 +143,7 @@ _FLAT = md.HeightField(np.zeros((8, 8)), 0.5, periodic=True)
 _FINE = md.HeightField(np.zeros((8, 8)), 0.05, periodic=True)
 _STEEP = md.HeightField(0.1 * np.random.default_rng(3).random((40, 40)), 0.1, periodic=True)
 _STEPS = md.HeightField(0.29 * (np.arange(13) % 8 < 4) + np.zeros((22, 1)), (0.113, 0.0905))
+_WALLS = md.HeightField(0.21 * (np.arange(59) % 8 < 4) + np.zeros((8, 1)), 0.0733)
 _GROOVES = md.HeightField(0.09 * np.tile(np.arange(24) % 8 < 4, (8, 1)), 0.07)
 _THROUGH = {"plugin": "diffraction_dielectric", "ext_ior": 1.0, "coherence_width": 5.0}
 _SHEET = _THROUGH | {"thin": True}
@@ -237,6 +238,10 @@ FURNACES_MORE = {
     "a gap over white": Furnace(_FINE, WHITE | {
         "int_ior": 1.01, "ext_ior": 1.0, "layers": 'layers = [["1.0", 0.1]]',
         "coherence_width": 0.8}, **_WIDE),
+    # the critical angle cuts lobes, and orders graze it within: 1.04
+    **{f"walls of index {index}": Furnace(_WALLS, _THROUGH | {
+        "int_ior": index, "model": "kirchhoff", "coherence_width": 6.73, "wavelength": wavelength})
+       for index, wavelength in ((1.2945, 672.0), (2.106, 540.0))},
     # red has negative weights
     **{f"colours through {'a sheet' if thin else 'an interface'}": Furnace(
         _STEEP, _THROUGH | {"int_ior": 2.4, "coherence_width": 12.0, "thin": thin},

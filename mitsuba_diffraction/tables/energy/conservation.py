@@ -37,8 +37,12 @@ from .transport import ScatteredOrders, Transport
 #: Polar angles beyond the grid of directions. Towards the horizon a gaining albedo rises as
 #: 1/cosθ or faster, and the plugin attenuates scaled light.
 GRAZING = np.radians([89.8, 89.9])
-#: Angle beyond the critical one, rad, at which light is all reflected.
-_BEYOND_CRITICAL = 1e-3
+#: Sine of the last critical angle that matters.
+_LAST_SINE = math.sin(LAST_ANGLE)
+#: Largest error of an index, which the plugin rounds, and the same as a share of its contrast.
+_INDEX_ERROR, _CONTRAST_ERROR = 1e-3, 0.125
+#: Least jump of the light sent on at a critical angle that a scale does not follow.
+_JUMP = 0.01
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
 _PHASE = 0.8
@@ -251,19 +255,24 @@ class SurfaceEnergy:
         return table, float(albedos.max())
 
     def _polar_angles(self, wavelengths: Real) -> Real:
-        """Return polar angles that s is found at: the grid's, or one is beyond the critical angle.
+        """Return polar angles that s is found at: the grid's, but about a critical angle.
 
-        The light of an interface jumps there. Where more is sent on beyond than comes in, a scale
-        that conserves light within would be interpolated across: under 0.5 µm 1.08 was left.
+        The light of an interface jumps there, and s is interpolated. The rows around have s of the
+        side that sends more on: light of the other side is attenuated between them.
         """
         theta, paths = np.array(self._grid.theta), self.material.paths(wavelengths[:1], 0.0)[0]
         total = min(paths, key=lambda path: path.critical_sine)
-        beyond = math.asin(total.critical_sine) + _BEYOND_CRITICAL
-        if not self._both_sides or beyond > LAST_ANGLE:
+        critical, sine = math.asin(total.critical_sine), total.critical_sine
+        if not self._both_sides or sine > _LAST_SINE:
             return theta
-        (make_light,) = self._lights(wavelengths[:1], np.array([beyond]), self._grid.phi)
-        if make_light().sent(self._ones)[total.came.number].max() > 1.0:
-            theta[int(self._grid.row(beyond))] = beyond
+        about = min(_INDEX_ERROR, _CONTRAST_ERROR * (1.0 - sine)) / math.sqrt(1.0 - sine**2)
+        sides = np.array([critical - about, critical + about])
+        (make_light,) = self._lights(wavelengths[:1], sides, self._grid.phi)
+        within, beyond = make_light().sent(self._ones)[total.came.number].max(axis=1)
+        if abs(within - beyond) > _JUMP:
+            first, last = self._grid.row(sides)
+            around = slice(math.floor(first), math.ceil(last) + 1)
+            theta[around] = sides[int(beyond > within)]
         return theta
 
     def _solved(self, light: ScatteredLight) -> Single:

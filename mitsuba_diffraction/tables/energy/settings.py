@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 #: Raised whenever the computation changes.
-VERSION = 62
+VERSION = 67
 
 
 @dataclass(frozen=True)

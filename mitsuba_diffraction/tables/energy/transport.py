@@ -290,10 +290,13 @@ class Transport:
         u, v = (row - i).astype(np.float32)[:, None], (column - j).astype(np.float32)
         left, right = j % half.azimuthal, (j + 1) % half.azimuthal
 
+        projected = np.cos(nodes).astype(np.float32)[:, None]
+        per_area = np.cos(theta).astype(np.float32)[:, None]
+
         def light(s: Single) -> Single:
-            seen = weak(s)
+            seen = weak(s) * projected
             across = seen[:, left] * (1.0 - v) + seen[:, right] * v
-            return np.asarray(across[i] * (1.0 - u) + across[i + 1] * u)
+            return np.asarray((across[i] * (1.0 - u) + across[i + 1] * u) / per_area)
 
         return light
 
@@ -342,7 +345,7 @@ class Transport:
             densities.append((mixture.beats, np.sqrt(gain * zeroth)))
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
-        scale = self._path.sign * k / mixture.pitch
+        scale = self._path.sign(cos_i, nodes.cosine) * (k / mixture.pitch)
         rows, columns = mixture.density.shape[1:]
         # places among thousands need no double precision, which takes six times as long
         x, y, turn = (
@@ -355,8 +358,8 @@ class Transport:
             factor = (k**2 * nodes.weights * nodes.cosine * gain).astype(np.float32)
             factors.append((density.ravel(), factor * (1.0 - upper_share), factor * upper_share))
         for n in range(len(theta)):
-            column = (cos * x[n] - sin * y + middle_x).astype(np.int32)
-            row = (sin * x[n] + cos * y + middle_y).astype(np.int32)
+            column = (cos * x[n] - sin * y[n] + middle_x).astype(np.int32)
+            row = (sin * x[n] + cos * y[n] + middle_y).astype(np.int32)
             np.clip(column, 0, columns - 1, out=column)
             np.clip(row, 0, rows - 1, out=row)
             index = (lower[n] * rows + row) * columns + column
@@ -379,18 +382,23 @@ class Transport:
 
         Of the pairs of a direction and an order, those below the horizon are left out at once.
         """
-        mixture = self._orders.mixture
+        mixture, signs = self._orders.mixture, np.array(self._path.signs)
         cosines, sine = self._start(theta[:, None, None])
-        places = mixture.frequency * (self._path.sign / self._k)
+        places = np.concatenate([mixture.frequency * (sign / self._k) for sign in signs])
         x = places[:, 0] - sine * np.cos(phi)[:, None]
         y = places[:, 1] - sine * np.sin(phi)[:, None]
         square = x * x + y * y
         pairs = square < (1.0 + LOBE_END * self._width) ** 2
         row, column, order = np.nonzero(pairs)
         radius, azimuth = np.sqrt(square[pairs]), np.arctan2(y[pairs], x[pairs])
-        which, cos_o, visible = nodes_across(self._width, radius, LEAST_COSINE)
-        row, order, azimuth = row[which], order[which], azimuth[which]
+        edge = self._path.left.critical_sine
+        which, cos_o, visible = nodes_across(self._width, radius, LEAST_COSINE, edge)
         cosines = cosines.ravel()
+        sign, order = signs[order // self._orders.strong], order % self._orders.strong
+        if len(signs) > 1:
+            seen = self._path.sign(cosines[row[which]], cos_o) == sign[which]
+            which, cos_o, visible = which[seen], cos_o[seen], visible[seen]
+        row, order, azimuth = row[which], order[which], azimuth[which]
         kappa = self._kappa(cosines[row], cos_o)
         gain = self._gain(cosines, row, cos_o, azimuth - phi[column[which]])
         shares = (mixture.strong_at(kappa, order) * gain * visible).astype(np.float32)
