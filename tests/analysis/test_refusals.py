@@ -23,6 +23,7 @@ from mitsuba_diffraction.analysis.tradeoff import lit_pairs
 from mitsuba_diffraction.analysis.tradeoff.measuring import MeasuredSetting, TradeoffSetting
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
 from mitsuba_diffraction.analysis.treatments import load_treatments
+from tests.analysis.perfect import perfect
 from tests.support.directions import polar, rough_patch
 from tests.support.orders import load, thin_grating
 from tests.support.refusals import file, refused
@@ -88,7 +89,8 @@ def iridescence(*ends: float) -> object:
     table = DiffractionTable.build(
         md.gratings.sinusoidal(1.6, 0.1, rows=2), tolerance=0.01, wavelength_range=ends
     )
-    return diffracted_light(table, LightDirection(30.0, 0.0))
+    light = LightDirection(30.0, 0.0)
+    return diffracted_light(table, light, perfect(light))
 
 
 def treatments(text: str) -> object:

@@ -26,8 +26,8 @@ def mesh(name):
         (SCENE.replace("$spp", "some"), "could not parse"),
         (SCENE.replace('"path"/>', '"path"><float name="depth" value="1"/></integrator>'),
          "no such parameter"),
-        (mesh("a.obj"), "tangents a.obj -o mesh.ply' first"),
-        (mesh("a.stl"), "'a.stl' is not a PLY mesh, which the scene expects: convert it"),
+        (mesh("a.obj"), "a.obj -o mesh.ply' first"),
+        (mesh("a.stl"), "a.stl' is not a PLY, which is expected: convert it"),
         (mesh("a.ply"), "/a.ply' is a damaged PLY"),
     ],
 )  # fmt: skip

@@ -13,13 +13,12 @@ import pytest
 import mitsuba_diffraction as md
 import mitsuba_diffraction.thesis.shaders  # registers its methods
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
+from mitsuba_diffraction.realtime.glsl.diffracting import pack_table
 from mitsuba_diffraction.realtime.glsl.emitters import Emitters
 from mitsuba_diffraction.realtime.glsl.export import make_shader
-from mitsuba_diffraction.realtime.glsl.methods import method_tables
 from mitsuba_diffraction.realtime.glsl.packing import pack_powers
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
-from mitsuba_diffraction.realtime.glsl.shader_materials import packed_by
 from mitsuba_diffraction.realtime.glsl.source import fragment_parts
 from mitsuba_diffraction.realtime.web.export import make_page
 from tests.support.orders import load, thin_grating
@@ -93,7 +92,7 @@ REFUSED: list[tuple[Callable[[Any], object], str]] = [
     (lambda _: pack_powers(md.DiffractionTable.build(GRATING, coherence_width=2.4,
                                                      coherence="patch")),
      "coherence='patch'.*use method fast"),
-    (lambda _: method_tables("flss", packed_by(load(thin_grating(0.5)).describe())),
+    (lambda _: pack_table(load(thin_grating(0.5)).describe(), "flss"),
      "solved orders.*use method fast"),
     *((lambda _, methods=methods: shader(methods, int_ior=1.5), "choose from fast, exact")
       for methods in (["flss"], [], ["fast"] * 2)),
