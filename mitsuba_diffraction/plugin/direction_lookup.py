@@ -34,8 +34,8 @@ class DirectionLookup:
     thickness : of a film; `nodes` are thicknesses then, nm.
     fringes : whether a value between wavelengths is that of the same fringe at both, of a film of
         the same share of the wavelength. At the same thickness fringes would be missed.
-    filmed : whether the material has a film. Where the stretch varies, a value is then interpolated
-        between two height scales at the same wavelength, each on a patch of its own stretch.
+    filmed : whether the material has a film. Where the stretch alone varies, a value is then
+        interpolated between height scales at the same wavelength, each on a patch of its stretch.
     exponent : of the mean over a colour's light. That of scales s is −2: an albedo a asks for
         s = 1/√a, so a colour's mean of s² a is 1 where 1/s² is the colour's albedo.
     """
@@ -72,8 +72,8 @@ class DirectionLookup:
         octaves = math.log2(wavelengths[-1] / wavelengths[0])
         self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
         self._logs_per_page = mi.Float(octaves / max(len(wavelengths) - 1, 1))
-        filmed = filmed and thickness is None and scales.stretch[0] != scales.stretch[1]
-        self._stretches = upload(mi.Float, np.array(stretches, np.float32)) if filmed else None
+        own = filmed and len(set(stretches)) > 1
+        self._stretches = upload(mi.Float, np.array(stretches, np.float32)) if own else None
         dr.make_opaque(
             self._low, self._slope, self._first, self._pages_per_log, self._logs_per_page
         )

@@ -144,6 +144,8 @@ _FINE = md.HeightField(np.zeros((8, 8)), 0.05, periodic=True)
 _STEEP = md.HeightField(0.1 * np.random.default_rng(3).random((40, 40)), 0.1, periodic=True)
 _STEPS = md.HeightField(0.29 * (np.arange(13) % 8 < 4) + np.zeros((22, 1)), (0.113, 0.0905))
 _WALLS = md.HeightField(0.21 * (np.arange(59) % 8 < 4) + np.zeros((8, 1)), 0.0733)
+_X = np.linspace(-1.0, 1.0, 20, endpoint=False)
+_CAP = np.maximum(1.0 - _X**2 - _X[:, None] ** 2, 0.0)
 _GROOVES = md.HeightField(0.09 * np.tile(np.arange(24) % 8 < 4, (8, 1)), 0.07)
 _THROUGH = {"plugin": "diffraction_dielectric", "ext_ior": 1.0, "coherence_width": 5.0}
 _SHEET = _THROUGH | {"thin": True}
@@ -223,6 +225,13 @@ FURNACES_MORE = {
     "stretched film": Furnace(_GROOVES, {
         "material": "Al", "film_ior": 1.5, "film_thickness": 300.0, "coherence_width": 0.9,
         "lateral_scale": _VARYING}, 1.04, **_WIDE),
+    # a scale was looked up at the light of the mean stretch: 1.3
+    "stretched layers of varied heights": Furnace(
+        md.HeightField(0.157 * _CAP, 0.0907, periodic=True), {
+            "int_ior": 1.065, "ext_ior": 1.0, "model": "kirchhoff", "coherence_width": 0.5,
+            "layers": 'layers = [["1.0949", 0.0617], ["2.095", 0.0251], ["1.0", 0.0324]]',
+            "lateral_scale": np.array([[1.0, 0.6, 0.78]]) * 0.455, "wavelength": 557.0,
+            "height_scale": np.array([[1.32, 0.83, 1.0]])}, 1.02, **_COARSE),
     # one and a half fringes
     "silver under a film of a texture": Furnace(
         md.gratings.sinusoidal(1.6, 0.2, periods=1, pixels_per_period=24, rows=8),
