@@ -16,7 +16,7 @@ from ..reference.boundary import polarisation_axes, turn
 from .grid import OrderGrid, grid_of
 from .listed import listed_jones
 from .listed_lookup import ListedLookup
-from .lookup import Arrays, BlockLookup, Lookup, Memory
+from .lookup import Arrays, BlockLookup, Lookup, Memory, Order
 from .polarised import IN_PLANE, TurnedAxes, nearest_jones, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
@@ -206,7 +206,7 @@ class _Placed(NamedTuple):
 
     lookup: Lookup
     row: Any
-    order: Any
+    order: Order
     active: NDArray[np.bool_]
     below: NDArray[np.bool_] | None
     y: Real
@@ -243,19 +243,17 @@ def _placed(light: _Light) -> _Placed:
     lookup = lookup_of(table)
     row = lookup.row(-x, -y, np.where(second, -1.0, 1.0) + 0.0 * x, np.maximum(lam, 1.0))
     below = np.full(len(x), second != transmitted) if lookup.sides == 2 else None
-    order = (m_x, m_y) if table.crossed else m_x
-    return _Placed(lookup, row, order, active, below, y, shape)
+    return _Placed(lookup, row, (m_x, m_y), active, below, y, shape)
 
 
 def lookup_in(
-    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool,
-    chances: bool = False,
-) -> Lookup:  # fmt: skip
+    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool
+) -> Lookup:
     """Return the look-up of a table, with its grid in a memory.
 
-    coated, elements, chances : as for `grid.grid_of`.
+    coated, elements : as for `grid.grid_of`.
     """
-    grid = grid_of(table, coated=coated, elements=elements, chances=chances)
+    grid = grid_of(table, coated=coated, elements=elements)
     held = memory(grid)
     coated = coated and table.superstrate != 1.0
     if isinstance(table.response, ListedResponse) and not coated:
