@@ -47,26 +47,25 @@ def imported_table(
     shown : source of the grid, for messages. Raises a DiffractionError as `read_orders` does.
     """
     ends = float(grid.wavelengths[0]), float(grid.wavelengths[-1])
-    thin, crossed = grid.values.shape[-1] == 4, grid.orders.ndim == 2
+    thin, crossed = grid.values.shape[-1] == 4, grid.crossed
     if thin and crossed:
         raise DiffractionError(
             f"{shown} has T_s and T_p: tables of crossed gratings hold reflected light alone; "
             "leave these columns out"
         )
     check_outline(periods, ends, superstrate, thin, listed=True)
-    orders = grid.orders if crossed else np.column_stack([grid.orders, 0 * grid.orders])
-    _check_orders(grid, orders, periods, superstrate, shown)
+    _check_orders(grid, periods, superstrate, shown)
     _check_repeated(grid, shown)
     values = np.where(np.isnan(grid.values), np.nan, np.maximum(grid.values, 0.0))
     lights = Lights(
-        grid.wavelengths, grid.theta, grid.phi, orders, _elements(values, grid, crossed)
+        grid.wavelengths, grid.theta, grid.phi, grid.pairs, _elements(values, grid, crossed)
     )
     if thin:
         table = _sheet(listed_response(lights, periods, superstrate), periods, ends, header)
     else:
         table = listed_table(lights, periods, header, superstrate=superstrate)
     warn_of_gaps(table, shown)
-    header |= _errors(table, grid, orders, values)
+    header |= _errors(table, grid, values)
     if header["reciprocity_error"] > _ONE_WAY:
         warn(
             f"light and reversed light differ by {header['reciprocity_error']:.0%} in {shown}, "
@@ -132,11 +131,10 @@ def _sheet(
 
 
 def _check_orders(
-    grid: Efficiencies, orders: NDArray[np.int64], periods: tuple[float, float],
-    superstrate: float, shown: str,
-) -> None:  # fmt: skip
+    grid: Efficiencies, periods: tuple[float, float], superstrate: float, shown: str
+) -> None:
     """Refuse light in evanescent orders, orders that propagate without light, and sums above 1."""
-    crossed = grid.orders.ndim == 2
+    crossed, orders = grid.crossed, grid.pairs
     lam, theta, phi = (
         axis.ravel() for axis in np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     )
@@ -155,7 +153,7 @@ def _check_orders(
     if len(extra := np.argwhere((powers.max(axis=-1) > ROUNDING) & (square(orders) < -_EDGE))):
         light, place = map(int, extra[0])
         raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {_shown(orders[place], crossed)} does not "
+            f"{shown}, {grid.light(light)}: order {grid.order(place)} does not "
             f"propagate; check {signs}"
         )
     most = [int(np.ceil(2.0 / float(step.min()))) if step.min() > 0.0 else 0 for step in steps]
@@ -167,8 +165,9 @@ def _check_orders(
             lacking[:, column] &= np.isnan(values[:, known[order]]).any(axis=-1)
     if lacking.any():
         light, place = map(int, np.argwhere(lacking)[0])
+        order = tuple(every[place].tolist())
         raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {_shown(every[place], crossed)} propagates, and "
+            f"{shown}, {grid.light(light)}: order {order if crossed else order[0]} propagates, and "
             "has no efficiencies; list it, with 0 if it has no light"
         )
     sums = powers.reshape(*powers.shape[:2], -1, 2).sum(axis=(1, 2)).max(axis=-1)
@@ -195,13 +194,7 @@ def _check_repeated(grid: Efficiencies, shown: str) -> None:
             )
 
 
-def _shown(order: NDArray[np.int64], crossed: bool) -> str:
-    return f"({order[0]}, {order[1]})" if crossed else str(order[0])
-
-
-def _errors(
-    table: OrderTable, grid: Efficiencies, orders: NDArray[np.int64], values: Real
-) -> dict[str, Any]:
+def _errors(table: OrderTable, grid: Efficiencies, values: Real) -> dict[str, Any]:
     """Compare a table with its list, per order and polarisation, and light with reversed light.
 
     Reversed light is compared in all orders but 0, reflected: η_m(ωi) = η_m(−ωo), where the list
@@ -210,7 +203,8 @@ def _errors(
     lam, theta, phi = np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     level = np.where(theta == 0.0, MIN_ANGLE, theta)
     x, y = (part[..., None] for part in _placed(level, phi, table.crossed))
-    light = x, y, lam[..., None], orders[:, 0], orders[:, 1]
+    orders = grid.pairs
+    light = x, y, lam[..., None], *orders.T
     got = [table.polarised_efficiency(*light)]
     if table.thin:
         got.append(table.polarised_efficiency(*light, transmitted=True))
@@ -220,8 +214,7 @@ def _errors(
     every = np.ones(truth.size // truth.shape[-1], bool).reshape(-1, len(orders))
 
     def place(light: int, order: int, kind: int) -> str:
-        shown = _shown(orders[order], table.crossed)
-        return f"{grid.light(light)}, order {shown}, {'RT'[kind // 2]}_{'sp'[kind % 2]}"
+        return f"{grid.light(light)}, order {grid.order(order)}, {'RT'[kind // 2]}_{'sp'[kind % 2]}"
 
     error = table_error(found.reshape(shape), truth.reshape(shape), every, _COUNTED, place)
     others = (orders != 0).any(axis=1)
@@ -272,7 +265,7 @@ def read_orders(
         "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",
     }  # fmt: skip
     grid, shown = read_efficiencies(path), repr(os.fspath(path))
-    if grid.orders.ndim == 2:
+    if grid.crossed:
         periods = period if isinstance(period, tuple) else (period, period)
     elif isinstance(period, tuple):
         raise DiffractionError(
