@@ -19,7 +19,10 @@ from ...plugin.sampling import invert
 from ...plugin.types import Colour, Context, Float, Index, Interaction, Vector2f
 from ..daylight import CHANNELS, ENDS, daylight_weights
 from ..lookup import Order
-from .lobes import MIN_SUM, REACH, Below, Draw, Incidence, OrderLobe, Reflected, wavenumber_of
+from .lobes import MIN_SUM, REACH, Below, Draw, OrderLobe, wavenumber_of
+
+#: Tangential part and cosine of ωi, in the patch's frame.
+Incidence = tuple[Vector2f, Float]
 
 
 class DaylightLobes:
@@ -40,15 +43,17 @@ class DaylightLobes:
         self._bins = len(weights.cumulative) - 1
         self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
 
-    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
+    def reflected(
+        self, pair: Pair, si: Interaction, below: Below, ctx: Context
+    ) -> tuple[Colour, Float]:
         """See `SpectralLobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
-        light = Incidence(pair.incident, pair.cos_i)
+        light = pair.incident, pair.cos_i
         total = self._zeroth(light, below, radius, pair)
         others = self.others(light, below, pair.uv, radius)
         total = [a + b for a, b in zip(total, others, strict=True)]
         *colours, density = (part * pair.cos_o for part in total)
-        return Reflected(mi.Color3f(*colours), dr.detach(density))
+        return mi.Color3f(*colours), dr.detach(density)
 
     def draw(
         self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
@@ -72,7 +77,8 @@ class DaylightLobes:
         self, light: Incidence, below: Below, wavelength: Float, order: Order
     ) -> tuple[Float, Float]:
         """Return the efficiency of an order, and its probability."""
-        row = self.lookup.row(*light.incident, light.cos_i, wavelength)
+        incident, cos_i = light
+        row = self.lookup.row(*incident, cos_i, wavelength)
         share, total = self.lookup.share(row, order, True, below), self.lookup.total(row)
         return share.efficiency, share.chance * dr.rcp(maximum(total, MIN_SUM))
 

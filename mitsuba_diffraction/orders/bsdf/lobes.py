@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -48,19 +47,6 @@ REACH = 18.0
 MIN_SUM = 1e-12
 
 
-class Reflected(NamedTuple):
-    """Light of a pair of directions.
-
-    Attributes
-    ----------
-    value : f cosθo.
-    density : of `SpectralLobes.draw`, per solid angle.
-    """
-
-    value: Spectrum
-    density: Float
-
-
 class Lit(NamedTuple):
     """Light of a pair of directions at one wavelength.
 
@@ -76,14 +62,6 @@ class Lit(NamedTuple):
     value: Float
     peak: Float
     terms: list[tuple[Vector2f, Float, Float]]
-
-
-@dataclass
-class Incidence:
-    """Incident light in the patch's frame: tangential part and cosine of ωi."""
-
-    incident: Vector2f
-    cos_i: Float
 
 
 class Draw(NamedTuple):
@@ -233,8 +211,12 @@ class SpectralLobes:
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
-        """Return value and density of a pair; the density is the mean over wavelengths.
+    def reflected(
+        self, pair: Pair, si: Interaction, below: Below, ctx: Context
+    ) -> tuple[Spectrum, Float]:
+        """Return f cosθo of a pair, and the density of `draw` per solid angle.
+
+        The density is the mean over wavelengths.
 
         below : whether ωo lies below a sheet, with the pair's ωo mirrored to above; None without a
             sheet.
@@ -260,7 +242,7 @@ class SpectralLobes:
             lit.append(Lit(row, light * peak, peak, terms))
             density += chance * peak * dr.rcp(maximum(self.lookup.total(row, near), MIN_SUM))
         mean = density * (1.0 / len(wavelengths))
-        return Reflected(self.spectrum(pair, ctx, lit), dr.detach(mean))
+        return self.spectrum(pair, ctx, lit), dr.detach(mean)
 
     def spectrum(self, pair: Pair, ctx: Context, lit: list[Lit]) -> Spectrum:
         """Return f cosθo of all wavelengths, depolarised in polarised variants."""
