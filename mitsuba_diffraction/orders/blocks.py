@@ -57,7 +57,7 @@ def reduced(table: OrderTable, band: Band, kind: int) -> Real:
     """Return the reduced efficiencies e (τ, ρ, w, j, q); 0 in order 0 of the reflection."""
     index = table.block
     assert index is not None
-    values = band.kind(kind)[..., 0].astype(np.float64)
+    values = band.kinds[kind][..., 0].astype(np.float64)
     tau, rho, w = (cells.even_nodes(n)[..., None] for n in band.counts)
     tau, rho = tau[:, None, None], rho[:, None]
     optical = table.optical_period

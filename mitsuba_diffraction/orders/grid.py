@@ -82,7 +82,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
         return list(of_kind if coated and table.superstrate != 1.0 else of_kind[:1])
 
     def matrices(of: Kind) -> Real:
-        values = table.bands[of.band].kind(of.kind).astype(np.float64)
+        values = table.bands[of.band].kinds[of.kind].astype(np.float64)
         if values.shape[-1] == MUELLER:
             values = smooth_elements(table, of.band, values)
         return resampled(table, of.band, values, counts, coated).reshape(-1, values.shape[-1])

@@ -116,13 +116,12 @@ def listed_response(
         factor = index if block and side == 0 else 1.0
         light = values[:, :, :, side].reshape(*values.shape[:3], left * len(orders), n)
         stored[:, :, :, side] = _filled(light, axes, np.tile(orders, (left, 1)), optical, factor)
-    in_plane = not crossed and bool(np.isin(azimuths, (0.0, 180.0)).all())
     phases = None
     if lights.jones is not None:
         entries = matrices.view(np.complex128).reshape(*stored.shape[:-1], 4)
         angles = np.angle((_pure(stored).conj() * entries).sum(axis=-1))
         phases = np.where(np.isnan(angles), np.float32(np.nan), angles.astype(np.float32))
-    return ListedResponse(axes, orders, stored, in_plane, phases=phases)
+    return ListedResponse(axes, orders, stored, phases=phases)
 
 
 def _pure(elements: NDArray[np.float32]) -> Complex:

@@ -74,15 +74,14 @@ def middles(nodes: NDArray[Any]) -> NDArray[Any]:
 def rows(table: OrderTable, of: Kind, counts: Counts, *, coated: bool = True) -> Rows:
     """Return the unpolarised efficiencies of a kind on a grid with so many cells."""
     table = on_cells(table)
-    grid = _grid(table, of.band, counts, coated)
-    unpolarised = table.bands[of.band].kind(of.kind)[..., 0].astype(np.float64)
+    tau, rho, _, lam = _grid(table, of.band, counts, coated)
+    unpolarised = table.bands[of.band].kinds[of.kind][..., 0].astype(np.float64)
     values = clamped(resampled(table, of.band, unpolarised, counts, coated))
     if table.superstrate == 1.0 or not coated:
         return Rows(values, values)
     channels = np.arange(values.shape[-1])
-    places = grid.tau[:, None, None, None], grid.rho[:, None, None]
-    lam = grid.wavelength[..., None]
-    light = cells.from_cell(of.band, of.kind, channels, *places, lam, table.optical_period)
+    places = tau[:, None, None, None], rho[:, None, None], lam[..., None]
+    light = cells.from_cell(of.band, of.kind, channels, *places, table.optical_period)
     through = leaving_transmittance(light.x**2 + light.y**2, table.superstrate)
     # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
     # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
@@ -100,7 +99,7 @@ def kept(table: OrderTable) -> float:
     """Return ρ of `optics.coat.passage`: the largest sum of a grating's efficiencies, below 1."""
     table, most = on_cells(table), 0.0
     for of in kinds_of(table):
-        values = clamped(table.bands[of.band].kind(of.kind)[..., 0].astype(np.float64))
+        values = clamped(table.bands[of.band].kinds[of.kind][..., 0].astype(np.float64))
         most = max(most, float(values.sum(axis=-1).max()))
     return min(most, _TRAPPED)
 
@@ -111,10 +110,10 @@ def resampled(
     """Interpolate values (τ, ρ, w, …) at nodes of a band to a grid with so many cells."""
     assert isinstance(table.response, CellResponse)
     matrix = cells.linear if table.response.even else cells.interpolation
-    known, grid = table.response.bands[k].counts, _grid(table, k, counts, coated)
-    along_tau, along_rho = matrix(known.tau, grid.tau), matrix(known.rho, grid.rho)
+    known, (tau, rho, big_k, lam) = table.response.bands[k].counts, _grid(table, k, counts, coated)
+    along_tau, along_rho = matrix(known.tau, tau), matrix(known.rho, rho)
     summed = np.einsum("ta,rb,abc...->trc...", along_tau, along_rho, values, optimize=True)
-    at = cells.w_of(grid.big_k, grid.wavelength, table.wavelengths, table.optical_period)
+    at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
     along_w = matrix(known.w, at)
     return np.asarray(np.einsum("rwc,trc...->trw...", along_w, summed, optimize=True), np.float64)
 
@@ -126,19 +125,11 @@ def clamped(values: Real) -> Real:
     return np.asarray(positive / np.maximum(total, 1.0))
 
 
-class _Grid(NamedTuple):
-    """Even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), vacuum, nm."""
-
-    tau: Real
-    rho: Real
-    big_k: Real
-    wavelength: Real
-
-
-def _grid(table: OrderTable, k: int, counts: Counts, coated: bool) -> _Grid:
+def _grid(table: OrderTable, k: int, counts: Counts, coated: bool) -> tuple[Real, Real, Real, Real]:
+    """Return the even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), nm."""
     tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
     big_k = (k + cells.sine_squared(rho))[:, None]
-    return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w, coated=coated))
+    return tau, rho, big_k, wavelength_of(table, big_k, w, coated=coated)
 
 
 def wavelength_of(table: OrderTable, big_k: Real, w: Real, *, coated: bool = True) -> Real:
@@ -229,10 +220,9 @@ def _sampled(table: OrderTable, of: Kind, counts: Counts) -> NDArray[np.float32]
     size = len(channels)
     for came in range(table.sides):
         for left in range(table.sides):
-            side = {"from_below": (came == 1) != bool(table.block), "transmitted": came != left}
             shares = table.efficiency(
                 index * x, index * y, light.wavelength[..., None], orders,
-                **(side if table.sides == 2 else {}),
+                **table.passage(came, left),
             )  # fmt: skip
             rows_, columns = (slice(size * n, size * (n + 1)) for n in (came, left))
             values[..., rows_, columns] = shares
