@@ -77,7 +77,7 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
 
     def efficiencies(of: Kind) -> list[Real]:
         if table.block:
-            return [blocks.reduced(table, table.bands[of.band], of.kind)]
+            return [blocks.reduced(table, of)]
         of_kind = rows(table, of, counts, coated=coated)
         return list(of_kind if coated and table.superstrate != 1.0 else of_kind[:1])
 
