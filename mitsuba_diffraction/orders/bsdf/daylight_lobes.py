@@ -18,7 +18,7 @@ from ...plugin.memory import index_between, read_record, upload
 from ...plugin.sampling import invert
 from ...plugin.types import Colour, Context, Float, Index, Interaction, Vector2f
 from ..daylight import CHANNELS, ENDS, daylight_weights
-from ..lookup import Order
+from ..lookup import Order, corner_weights, weighted
 from .lobes import MIN_SUM, REACH, Below, Draw, OrderLobe, wavenumber_of
 
 #: Tangential part and cosine of ωi, in the patch's frame.
@@ -106,7 +106,8 @@ class DaylightLobes:
         exp(−σ² (q_m × (u, v))²/ρ²).
         """
         square = maximum(radius, 1e-8)
-        row, upper_share, scale = self.smoothing(square)
+        variance = dr.rcp(square) * (0.5 / self.sigma**2)
+        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
         units = [2.0 * math.pi / period for period in self._window.periods]
         shortest, longest = self.waves
         if self._window.crossed:
@@ -115,7 +116,7 @@ class DaylightLobes:
             count, first = self._reached(uv, radius)
 
         def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
-            light, (u, v, square, first, upper_share, scale) = inputs
+            light, (u, v, square, first, variance, scale) = inputs
             if self._window.crossed:
                 order = self.lookup.order_of_port(n)
             else:
@@ -125,12 +126,12 @@ class DaylightLobes:
             aside = dr.square(self.sigma * (q_x * v - q_y * u)) * dr.rcp(square)
             lit = (k > shortest) & (k < longest) & (aside < REACH)
             k = dr.select(lit, k, longest)
-            weights = self.weights(k, row, upper_share)
+            weights = self.weights(k, variance)
             value, share = self.shares(light, below, 2e3 * math.pi * dr.rcp(k), order)
             lobe = dr.select(lit, scale * dr.exp(-aside), 0.0)
             return added(sums, weights, lobe, value, share)
 
-        inputs = light, [uv.x, uv.y, square, first, upper_share, scale]
+        inputs = light, [uv.x, uv.y, square, first, variance, scale]
         return sum_of(count, add, inputs, [mi.Float(0.0)] * CHANNELS)
 
     def _reached(self, uv: Vector2f, radius: Float) -> tuple[Index, Float]:
@@ -148,30 +149,13 @@ class DaylightLobes:
         lit = (last >= first) & (radius * per_order**2 > 0.25)
         return dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, most)), 0), first
 
-    def smoothing(self, square: Float) -> tuple[Index, Float, Float]:
-        """Return the row of `weights`, place in it, and scale of lobes, for u² + v²."""
-        variance = dr.rcp(square) * (0.5 / self.sigma**2)
-        place = (variance - self._variances[0]) * (
-            self._counts[0] / (self._variances[1] - self._variances[0])
-        )
-        lower = index_between(dr.floor(place), 0.0, self._counts[0] - 1.0)
-        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
-        return index_of(lower), clip(place - lower, 0.0, 1.0), scale
-
-    def weights(self, k: Float, row: Index, share: Float) -> list[Float]:
+    def weights(self, k: Float, variance: Float) -> list[Float]:
         """Interpolate the smoothed weights of a wavenumber."""
-        place = (k - self.waves[0]) * (self._counts[1] / (self.waves[1] - self.waves[0]))
-        lower = index_between(dr.floor(place), 0.0, self._counts[1] - 1.0)
-        t = clip(place - lower, 0.0, 1.0)
-        values = read_record(self._smoothed, row * self._counts[1] + index_of(lower), 4 * CHANNELS)
-        return [
-            dr.lerp(
-                dr.lerp(values[c], values[CHANNELS + c], t),
-                dr.lerp(values[2 * CHANNELS + c], values[3 * CHANNELS + c], t),
-                share,
-            )
-            for c in range(CHANNELS)
-        ]
+        ends = zip((variance, k), (self._variances, self.waves), strict=True)
+        places = [clip((x - low) * (1.0 / (high - low)), 0.0, 1.0) for x, (low, high) in ends]
+        cell, shares = corner_weights(places, self._counts, 1.0)
+        values = read_record(self._smoothed, cell, 4 * CHANNELS)
+        return [weighted(shares, values[c::CHANNELS]) for c in range(CHANNELS)]
 
 
 def added(
