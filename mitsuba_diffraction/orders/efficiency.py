@@ -93,8 +93,7 @@ def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
             )
     else:
         difference = difference + turned.sine * sine
-    difference = np.clip(difference, -mean, mean)
-    return np.stack([mean + difference, mean - difference], axis=-1)
+    return _both(mean, difference)
 
 
 def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
@@ -107,13 +106,25 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
     p; or as for `efficiency`.
     """
     at = _Light(table, *light, **sides)
-    mean, difference, _ = _linear(at)
+    mean = _linear(at)[0]
     turned = np.abs(_turned(at).sine) > IN_PLANE
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
             "E and B along the grooves would follow"
         )
+    return shares_along(table, *light, **sides)
+
+
+def shares_along(table: OrderTable, *light: Any, **sides: bool) -> Real:
+    """Return `groove_efficiency` of any table; (…, 1) of a table of unpolarised light."""
+    if table.response.elements == UNPOLARISED:
+        return efficiency(table, *light, **sides)[..., None]
+    return _both(*_linear(_Light(table, *light, **sides))[:2])
+
+
+def _both(mean: Real, difference: Real) -> Real:
+    """Return the shares (…, 2) of two polarisations by their mean, and half of their difference."""
     difference = np.clip(difference, -mean, mean)
     return np.stack([mean + difference, mean - difference], axis=-1)
 

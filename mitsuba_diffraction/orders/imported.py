@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..arrays import Real
 from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
-from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
+from .listed import Lights, listed_response, mirror_of, warn_of_gaps
 from .lists import ROUNDING, Efficiencies, read_efficiencies
 from .polarised import MIN_ANGLE, turned_axes
 from .response import LARGEST_SUM, ListedResponse, canonical, orders_between
@@ -60,10 +60,11 @@ def imported_table(
     lights = Lights(
         grid.wavelengths, grid.theta, grid.phi, grid.pairs, _elements(values, grid, crossed)
     )
+    response = listed_response(lights, periods, superstrate)
     if thin:
-        table = _sheet(listed_response(lights, periods, superstrate), periods, ends, header)
+        table = _sheet(response, periods, ends, header)
     else:
-        table = listed_table(lights, periods, header, superstrate=superstrate)
+        table = OrderTable(periods, ends, response, superstrate, header)
     warn_of_gaps(table, shown)
     header |= _errors(table, grid, values)
     if header["reciprocity_error"] > _ONE_WAY:

@@ -55,21 +55,6 @@ def mirror_of(theta: ArrayLike, phi: ArrayLike) -> tuple[Real, Real]:
     return np.asarray(-sine * np.cos(turn)), np.asarray(-sine * np.sin(turn))
 
 
-def listed_table(
-    lights: Lights,
-    periods: tuple[float, float],
-    header: dict[str, Any],
-    *,
-    superstrate: float = 1.0,
-    thin: bool = False,
-    block: float | None = None,
-) -> OrderTable:
-    """Return the table of a grid of lights; other arguments as of `OrderTable`."""
-    response = listed_response(lights, periods, superstrate, block)
-    ends = float(lights.wavelengths[0]), float(lights.wavelengths[-1])
-    return OrderTable(periods, ends, response, superstrate, header, thin, block)
-
-
 def listed_response(
     lights: Lights, periods: tuple[float, float], superstrate: float, block: float | None = None
 ) -> ListedResponse:

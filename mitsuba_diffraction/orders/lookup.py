@@ -113,7 +113,7 @@ class Share(NamedTuple):
 
     Attributes
     ----------
-    efficiency : share of the incident light.
+    efficiency : share of the incident light, with the light of a coat's face.
     chance : probability of drawing, times `Lookup.total`; the efficiency, but under a coat.
     """
 
@@ -222,7 +222,7 @@ class Lookup:
             self.at_port(row, port, 0, propagates) * passage(through, self._kept),
             self.at_port(row, port, 1, propagates),
         )
-        return Share(*(xp.where(leaves, self._outside(row, s, mirror), 0.0) for s in shares))
+        return Share(*(xp.where(leaves, xp.fma(row.entering, s, mirror), 0.0) for s in shares))
 
     def repeated(self, row: Row, order: Order, active: Mask = True) -> Number:
         """Return an order's efficiency within the coat, with all reflections between its face."""
@@ -240,7 +240,7 @@ class Lookup:
         """
         value = self.at_port(row, self.ports(row), self._parts - 1, active)
         if self.coated:
-            value = self._outside(row, value, row.face)
+            value = of(value).fma(row.entering, value, row.face)
         return value * RAISED
 
     def elements(
@@ -275,11 +275,6 @@ class Lookup:
         record = (row.start + port) * self._parts + part
         corners = self.memory.read("corners", record, 8, active & row.lit)
         return weighted(row.weights, corners)
-
-    @staticmethod
-    def _outside(row: Row, within: Number, mirror: Number) -> Number:
-        """Return light that enters through the coat's face, and adds to the face's light."""
-        return of(within).fma(row.entering, within, mirror)
 
     def _through(self, cosine: Number) -> Number:
         return face_transmittance(cosine, self.index)

@@ -56,7 +56,7 @@ def _efficiencies(amplitudes: Complex, station: Station, index: float, y: float)
     waves = np.sqrt(1.0 - y * y) * station.sines_of(inside), np.full(m, y)
     within_it = Inner(np.arange(m), index, 0.0)
     flat = scattered(waves, (), index**2, np.arange(m)[common], 0.0, within_it)
-    flat = flat.transpose(0, 2, 3, 1) * [[1.0, -1.0], [-1.0, 1.0]]
+    flat = flat.transpose(0, 2, 3, 1) * np.array([[1.0, -1.0], [-1.0, 1.0]])
     low, high = np.arange(n, n + m), np.arange(n)
     back, mirror = _products(_KEPT * flat[low, low]), _products(flat[high, high])
     out, into = _products(flat[low[common], high]), _products(flat[high, low[common]])

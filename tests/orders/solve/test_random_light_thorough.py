@@ -50,11 +50,7 @@ def missed(table, fine, jobs, x, y, lam):
         side = 0 if guided else n % table.sides
         at = index * x[n], index * y[n], lam[n], *leaving.T
         truth, found = by_polarisation(
-            table,
-            amplitudes[place],
-            at,
-            side * len(leaving) + port,
-            (side == 1) != bool(table.block),
+            table, amplitudes[place], at, side * len(leaving) + port, side
         )
         shares.append(np.abs(found - truth).sum() / truth.sum())
     return np.array(shares)
