@@ -1,6 +1,6 @@
 """`read_orders`: the table of a file of efficiencies of s and p, as of another program or a bench.
 
-Efficiencies of s and p become elements of Mueller matrices about the axes of the grooves
+Lights of s and p become elements of Mueller matrices about the axes of the grooves
 (`polarised`), which have no special place at the normal: M₀₁ = ½(η_s − η_p) cos 2ψ and
 M₀₂ = ½(η_s − η_p) sin 2ψ, with ψ from the axis e to that of s (`polarised.turned_axes`).
 """
@@ -20,7 +20,7 @@ from ..arrays import Real
 from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
 from .listed import Lights, listed_response, mirror_of, warn_of_gaps
-from .lists import ROUNDING, Efficiencies, read_efficiencies
+from .lists import ROUNDING, read_efficiencies
 from .polarised import MIN_ANGLE, turned_axes
 from .response import LARGEST_SUM, ListedResponse, canonical, orders_between
 from .table import OrderTable, check_outline
@@ -38,51 +38,13 @@ _REPEATED = 1e-3
 _COUNTED = 1e-9
 
 
-def imported_table(
-    grid: Efficiencies, periods: tuple[float, float], superstrate: float, shown: str,
-    header: dict[str, Any],
-) -> OrderTable:  # fmt: skip
-    """Return the table of a file's efficiencies; its errors are added to the header.
-
-    shown : source of the grid, for messages. Raises a DiffractionError as `read_orders` does.
-    """
-    ends = float(grid.wavelengths[0]), float(grid.wavelengths[-1])
-    thin, crossed = grid.values.shape[-1] == 4, grid.crossed
-    if thin and crossed:
-        raise DiffractionError(
-            f"{shown} has T_s and T_p: tables of crossed gratings hold reflected light alone; "
-            "leave these columns out"
-        )
-    check_outline(periods, ends, superstrate, thin, listed=True)
-    _check_orders(grid, periods, superstrate, shown)
-    _check_repeated(grid, shown)
-    values = np.where(np.isnan(grid.values), np.nan, np.maximum(grid.values, 0.0))
-    lights = Lights(
-        grid.wavelengths, grid.theta, grid.phi, grid.pairs, _elements(values, grid, crossed)
-    )
-    response = listed_response(lights, periods, superstrate)
-    if thin:
-        table = _sheet(response, periods, ends, header)
-    else:
-        table = OrderTable(periods, ends, response, superstrate, header)
-    warn_of_gaps(table, shown)
-    header |= _errors(table, grid, values)
-    if header["reciprocity_error"] > _ONE_WAY:
-        warn(
-            f"light and reversed light differ by {header['reciprocity_error']:.0%} in {shown}, "
-            "which no grating does: efficiencies are shares of power, |amplitude|² times the ratio "
-            "of cosines; check that, and the signs of the orders and of phi"
-        )
-    return replace(table, header=header)
-
-
 def _placed(theta: Real, phi: Real, crossed: bool) -> tuple[Real, Real]:
     """Return the mirror direction of light; of grooves the image with y at least 0."""
     x, y = mirror_of(theta, phi)
     return x, y if crossed else np.abs(y)
 
 
-def _elements(values: Real, grid: Efficiencies, crossed: bool) -> Real:
+def _elements(values: Real, grid: Lights, crossed: bool) -> Real:
     """Return elements (a, b, c, 1, sides, m, 3) of efficiencies (a, b, c, m, 2 or 4)."""
     sides = np.stack(np.split(values, values.shape[-1] // 2, axis=-1), axis=3)
     mean, half = sides.mean(axis=-1), 0.5 * (sides[..., 0] - sides[..., 1])
@@ -132,10 +94,10 @@ def _sheet(
 
 
 def _check_orders(
-    grid: Efficiencies, periods: tuple[float, float], superstrate: float, shown: str
+    grid: Lights, periods: tuple[float, float], superstrate: float, shown: str
 ) -> None:
     """Refuse light in evanescent orders, orders that propagate without light, and sums above 1."""
-    crossed, orders = grid.crossed, grid.pairs
+    crossed, orders = grid.crossed, grid.orders
     lam, theta, phi = (
         axis.ravel() for axis in np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     )
@@ -179,7 +141,7 @@ def _check_orders(
         )
 
 
-def _check_repeated(grid: Efficiencies, shown: str) -> None:
+def _check_repeated(grid: Lights, shown: str) -> None:
     """Refuse a direction that is there in other words with other efficiencies."""
     theta, phi = (part.ravel() for part in canonical(grid.theta, grid.phi, True))
     names = np.stack(np.meshgrid(grid.theta, grid.phi, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -195,7 +157,7 @@ def _check_repeated(grid: Efficiencies, shown: str) -> None:
             )
 
 
-def _errors(table: OrderTable, grid: Efficiencies, values: Real) -> dict[str, Any]:
+def _errors(table: OrderTable, grid: Lights, values: Real) -> dict[str, Any]:
     """Compare a table with its list, per order and polarisation, and light with reversed light.
 
     Reversed light is compared in all orders but 0, reflected: η_m(ωi) = η_m(−ωo), where the list
@@ -204,7 +166,7 @@ def _errors(table: OrderTable, grid: Efficiencies, values: Real) -> dict[str, An
     lam, theta, phi = np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     level = np.where(theta == 0.0, MIN_ANGLE, theta)
     x, y = (part[..., None] for part in _placed(level, phi, table.crossed))
-    orders = grid.pairs
+    orders = grid.orders
     light = x, y, lam[..., None], *orders.T
     got = [table.polarised_efficiency(*light)]
     if table.thin:
@@ -275,4 +237,29 @@ def read_orders(
         )
     else:
         periods = period, math.inf
-    return imported_table(grid, periods, superstrate, shown, header)
+    ends = float(grid.wavelengths[0]), float(grid.wavelengths[-1])
+    thin, crossed = grid.values.shape[-1] == 4, grid.crossed
+    if thin and crossed:
+        raise DiffractionError(
+            f"{shown} has T_s and T_p: tables of crossed gratings hold reflected light alone; "
+            "leave these columns out"
+        )
+    check_outline(periods, ends, superstrate, thin, listed=True)
+    _check_orders(grid, periods, superstrate, shown)
+    _check_repeated(grid, shown)
+    values = np.where(np.isnan(grid.values), np.nan, np.maximum(grid.values, 0.0))
+    lights = grid._replace(values=_elements(values, grid, crossed))
+    response = listed_response(lights, periods, superstrate)
+    if thin:
+        table = _sheet(response, periods, ends, header)
+    else:
+        table = OrderTable(periods, ends, response, superstrate, header)
+    warn_of_gaps(table, shown)
+    header |= _errors(table, grid, values)
+    if header["reciprocity_error"] > _ONE_WAY:
+        warn(
+            f"light and reversed light differ by {header['reciprocity_error']:.0%} in {shown}, "
+            "which no grating does: efficiencies are shares of power, |amplitude|² times the ratio "
+            "of cosines; check that, and the signs of the orders and of phi"
+        )
+    return replace(table, header=header)

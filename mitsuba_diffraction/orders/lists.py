@@ -37,6 +37,7 @@ from ..errors import DiffractionError, one_line, quoted, warn
 from ..extras import optional
 from ..files import FileKind, beginning, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES, bounded_memory, check_content
+from .listed import Lights
 from .response import LARGEST_SUM
 from .table import WAVELENGTHS
 
@@ -60,44 +61,6 @@ _PER_CENT = ("%", "percent", "per cent")
 _BEGINS_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-class Efficiencies(NamedTuple):
-    """Efficiencies on a regular grid of light.
-
-    Attributes
-    ----------
-    wavelengths, theta, phi : (a,), (b,), (c,) ascending; nm in vacuum, degrees.
-    orders : (m, 1) whole numbers, ascending; (m, 2) of a crossed grating.
-    values : (a, b, c, m, 2) reflected, or (a, b, c, m, 4) reflected and transmitted, of light of s
-        and of p polarisation; NaN where the file has none.
-    """
-
-    wavelengths: Real
-    theta: Real
-    phi: Real
-    orders: NDArray[np.int64]
-    values: Real
-
-    def light(self, number: int) -> str:
-        """Return the name of a light, by its place in the grid of wavelengths, θ and φ."""
-        a, b, c = np.unravel_index(number, self.values.shape[:3])
-        return f"{self.wavelengths[a]:g} nm, theta {self.theta[b]:g}°, phi {self.phi[c]:g}°"
-
-    def order(self, number: int) -> str:
-        """Return the name of an order, by its place among them."""
-        name = ", ".join(map(str, self.orders[number]))
-        return f"({name})" if self.crossed else name
-
-    @property
-    def crossed(self) -> bool:
-        """Whether the grating repeats along y, too."""
-        return self.orders.shape[1] == 2
-
-    @property
-    def pairs(self) -> NDArray[np.int64]:
-        """Orders (m_x, m_y), (m, 2)."""
-        return self.orders if self.crossed else np.insert(self.orders, 1, 0, axis=1)
-
-
 class Variable(NamedTuple):
     """Variable of a NetCDF file: names of its dimensions, numbers, and units ("" if unknown)."""
 
@@ -111,8 +74,11 @@ def axes_of(names: Collection[str]) -> tuple[str, ...]:
     return AXES if set(PAIR).isdisjoint(names) else (*AXES[:3], *PAIR)
 
 
-def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
+def read_efficiencies(path: str | os.PathLike[str]) -> Lights:
     """Read a file of efficiencies; see the module.
+
+    Values of the lights are (a, b, c, m, 2) reflected, or (a, b, c, m, 4) reflected and transmitted
+    shares of light of s and of p polarisation; NaN where the file has none.
 
     Raises a DiffractionError if the file cannot be read, lacks a column or variable, has an unknown
     unit, a hole in its grid, an order twice, or numbers out of range.
@@ -137,7 +103,7 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     return grid
 
 
-def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
+def _of_lines(path: str | os.PathLike[str], shown: str) -> Lights:
     """Return the grid of a text of columns with names."""
     columns = read_columns(path)
     if not len(columns.numbers):
@@ -152,7 +118,7 @@ def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
     return _regular(lights, powers, shown)
 
 
-def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
+def _of_variables(variables: dict[str, Variable], shown: str) -> Lights:
     """Return the grid of a NetCDF file's variables."""
     kinds = _kinds(list(variables), shown, "variable")
     every = axes_of(variables)
@@ -188,7 +154,7 @@ def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
     return _regular(columns, np.column_stack(powers), shown)
 
 
-def _regular(lights: Real, powers: Real, shown: str) -> Efficiencies:
+def _regular(lights: Real, powers: Real, shown: str) -> Lights:
     """Put lines on the grid that they form.
 
     lights : (n, 4) coordinates, or (n, 5) of a crossed grating, as `axes_of` has them.
@@ -215,7 +181,9 @@ def _regular(lights: Real, powers: Real, shown: str) -> Efficiencies:
         )
     _check_size(shape, powers.shape[1], shown)
     values = np.full((*shape, powers.shape[1]), np.nan)
-    grid = Efficiencies(axes[0], axes[1], axes[2], orders, values)
+    crossed = orders.shape[1] == 2
+    pairs = orders if crossed else np.insert(orders, 1, 0, axis=1)
+    grid = Lights(axes[0], axes[1], axes[2], pairs, values, crossed)
     place = light * shape[3] + column.ravel()
     found, counts = np.unique(place, return_counts=True)
     if (counts > 1).any():
@@ -324,7 +292,7 @@ def _check_size(shape: Sequence[int], kinds: int, shown: str) -> None:
         )
 
 
-def _check(grid: Efficiencies, shown: str) -> None:
+def _check(grid: Lights, shown: str) -> None:
     """Check the range of efficiencies."""
     wrong = ~np.isnan(grid.values) & ~((grid.values >= -ROUNDING) & (grid.values <= LARGEST_SUM))
     if wrong.any():

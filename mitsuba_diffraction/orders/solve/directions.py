@@ -121,7 +121,9 @@ def solve_directions(
     if not is_all:
         header["directions"] = [[float(t), float(p)] for t in polar for p in azimuth]
     matrices = None if jones is None else jones.reshape(*shape, *jones.shape[1:])
-    grid = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]), matrices)
+    crossed = grating.cell is not None
+    numbers = values.reshape(*shape, *values.shape[1:])
+    grid = Lights(lam, polar, azimuth, orders, numbers, crossed, matrices)
     response = listed_response(grid, grating.periods, superstrate, block)
     if is_all:
         # index of a clear material in the middle of its wavelengths

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, OrderTable
-from mitsuba_diffraction.orders.listed import Lights, listed_table
+from mitsuba_diffraction.orders.listed import Lights, listed_response
 from tests.orders.kinds import light
 from tests.support import crossed
 
@@ -44,7 +44,7 @@ def lights_of(value):
     """One light with order (0, 0) and (1, 0)."""
     values = np.full((1, 1, 1, 1, 1, 2, 1), value)
     one = np.array([500.0]), np.zeros(1), np.zeros(1)
-    return Lights(*one, np.array([[0, 0], [1, 0]]), values)
+    return Lights(*one, np.array([[0, 0], [1, 0]]), values, crossed=True)
 
 
 @pytest.mark.parametrize(
@@ -58,5 +58,6 @@ def lights_of(value):
     ],
 )
 def test_what_is_no_table_is_refused(periods, value, options, message):
+    response = listed_response(lights_of(value), periods, 1.0)
     with pytest.raises(DiffractionError, match=message):
-        listed_table(lights_of(value), periods, {}, **options)
+        OrderTable(periods, (500.0, 500.0), response, **options)
