@@ -22,19 +22,6 @@ from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
 
 
-class _Light(NamedTuple):
-    """Light and the order that is looked up, as the parameters of `efficiency`."""
-
-    table: OrderTable
-    x: ArrayLike
-    y: ArrayLike
-    wavelength: ArrayLike
-    order: ArrayLike
-    order_y: ArrayLike = 0
-    from_below: bool = False
-    transmitted: bool = False
-
-
 def efficiency(
     table: OrderTable,
     x: ArrayLike,
@@ -65,8 +52,8 @@ def efficiency(
     -------
     (…) share of the incident light, 0 for orders that do not propagate.
     """
-    light = _Light(table, x, y, wavelength, order, order_y, from_below, transmitted)
-    placed = _placed(light)
+    light = x, y, wavelength, order, order_y
+    placed = _placed(table, *light, from_below=from_below, transmitted=transmitted)
     share = placed.lookup.share(placed.row, placed.order, placed.active, placed.below)
     return share.efficiency.reshape(placed.shape)
 
@@ -80,9 +67,8 @@ def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
     coherent sums of the table's components, if a solved table has no Mueller matrices; or as
     `efficiency` does.
     """
-    at = _Light(table, *light, **sides)
-    mean, cosine, sine = _linear(at)
-    turned = _turned(at)
+    mean, cosine, sine = _linear(table, *light, **sides)
+    turned = _turned(*light)
     difference = cosine * turned.cosine
     if sine is None:
         if np.any((np.abs(turned.sine) > IN_PLANE) & (mean > 0.0)):
@@ -105,9 +91,8 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
     Raises a DiffractionError for conical light, if the table is imported from efficiencies of s and
     p; or as for `efficiency`.
     """
-    at = _Light(table, *light, **sides)
-    mean = _linear(at)[0]
-    turned = np.abs(_turned(at).sine) > IN_PLANE
+    mean = _linear(table, *light, **sides)[0]
+    turned = np.abs(_turned(*light).sine) > IN_PLANE
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
@@ -120,7 +105,7 @@ def shares_along(table: OrderTable, *light: Any, **sides: bool) -> Real:
     """Return `groove_efficiency` of any table; (…, 1) of a table of unpolarised light."""
     if table.response.elements == UNPOLARISED:
         return efficiency(table, *light, **sides)[..., None]
-    return _both(*_linear(_Light(table, *light, **sides))[:2])
+    return _both(*_linear(table, *light, **sides)[:2])
 
 
 def _both(mean: Real, difference: Real) -> Real:
@@ -129,17 +114,17 @@ def _both(mean: Real, difference: Real) -> Real:
     return np.stack([mean + difference, mean - difference], axis=-1)
 
 
-def _turned(light: _Light) -> TurnedAxes:
-    return turned_axes(np.asarray(light.x, np.float64), np.asarray(light.y, np.float64))
+def _turned(x: ArrayLike, y: ArrayLike, *_: Any) -> TurnedAxes:
+    return turned_axes(np.asarray(x, np.float64), np.asarray(y, np.float64))
 
 
-def _linear(light: _Light) -> tuple[Real, Real, Real | None]:
+def _linear(table: OrderTable, *light: Any, **sides: bool) -> tuple[Real, Real, Real | None]:
     """Return M₀₀, M₀₁ and M₀₂ of an order; None for the last one where it is not known."""
-    if light.table.response.elements == UNPOLARISED:
+    if table.response.elements == UNPOLARISED:
         raise DiffractionError(
             "this table has efficiencies of unpolarised light alone; take efficiency"
         )
-    parts = np.moveaxis(_elements(light)[..., :LINEAR], -1, 0)
+    parts = np.moveaxis(_elements(table, *light, **sides)[..., :LINEAR], -1, 0)
     return parts[0], parts[1], parts[2] if len(parts) > ALONG else None
 
 
@@ -151,7 +136,7 @@ def mueller(table: OrderTable, *light: Any) -> Real:
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    return mueller_matrices(_jones(_Light(table, *light)))
+    return mueller_matrices(_jones(table, *light))
 
 
 class JonesMatrices(NamedTuple):
@@ -178,11 +163,11 @@ def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    at = _Light(table, *light)
-    exact = listed_jones(*at[:6])
+    at = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in (*light, 0.0)[:5]))
+    exact = listed_jones(table, *at)
     with_phase = np.isfinite(exact[..., 0, 0])
-    of_grooves = np.where(with_phase[..., None, None], exact, _jones(at))
-    x, y, lam, m_x, m_y = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in at[1:6]))
+    of_grooves = np.where(with_phase[..., None, None], exact, _jones(table, *at))
+    x, y, lam, m_x, m_y = at
     steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
     shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
     leaving = tuple(part + shift for part, shift in zip((x, y), shifts, strict=True))
@@ -200,15 +185,15 @@ def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
     return JonesMatrices(np.asarray(found * phase[..., None, None]), with_phase)
 
 
-def _jones(light: _Light) -> NDArray[np.complex128]:
+def _jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     """Return the Jones matrices (…, 2, 2) of an order about e and f; any phase."""
-    if not light.table.polarised:
+    if not table.polarised:
         raise DiffractionError(
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    entries = nearest_jones(list(np.moveaxis(_elements(light), -1, 0)))
-    scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(*light[:6]))[..., None]
+    entries = nearest_jones(list(np.moveaxis(_elements(table, *light), -1, 0)))
+    scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(table, *light))[..., None]
     return scaled.reshape(*scaled.shape[:-1], 2, 2)
 
 
@@ -224,24 +209,25 @@ class _Placed(NamedTuple):
     shape: tuple[int, ...]
 
 
-def _elements(light: _Light) -> Real:
+def _elements(table: OrderTable, *light: Any, **sides: bool) -> Real:
     """Return the first elements of the Mueller matrices of an order, (…, n)."""
-    placed = _placed(light)
+    placed = _placed(table, *light, **sides)
     elements = placed.lookup.elements(
         placed.row, placed.order, placed.y, placed.active, placed.below
     )
     return np.stack(elements, axis=-1).reshape(*placed.shape, -1)
 
 
-def _placed(light: _Light) -> _Placed:
-    table, x, y, wavelength, m_x, m_y, from_below, transmitted = light
+def _placed(
+    table: OrderTable, x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, order: ArrayLike,
+    order_y: ArrayLike = 0, *, from_below: bool = False, transmitted: bool = False,
+) -> _Placed:  # fmt: skip
     if (from_below or transmitted) and table.sides == 1:
         raise DiffractionError(
             "this table has reflected light alone; solve the profile with thin for that below"
         )
-    parts = np.broadcast_arrays(
-        *(np.asarray(value, np.float64) for value in (x, y, wavelength, m_x, m_y))
-    )
+    light = x, y, wavelength, order, order_y
+    parts = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in light))
     shape = parts[0].shape
     x, y, lam, m_x, m_y = (part.ravel() for part in parts)
     second = from_below != bool(table.block)  # whether the light's ports are the second half
