@@ -139,20 +139,17 @@ def mueller(table: OrderTable, *light: Any) -> Real:
     return mueller_matrices(_jones(table, *light))
 
 
-class JonesMatrices(NamedTuple):
-    """Jones matrices (…, 2, 2), and whether the table has their common phase (…)."""
-
-    matrices: NDArray[np.complex128]
-    with_phase: NDArray[np.bool_]
-
-
 def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     """Return `jones_matrices` alone."""
-    return jones_matrices(table, *light).matrices
+    return jones_matrices(table, *light)[0]
 
 
-def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
+def jones_matrices(
+    table: OrderTable, *light: Any
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Return the Jones matrices of an order about s and p, as ray tracers take them.
+
+    (…, 2, 2), and whether the table has their common phase (…).
 
     E_leaving = J E_incident times the root of the ratio of cosines: |J|² are shares of the light.
     s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d. Time is exp(−iωt), and
@@ -182,7 +179,7 @@ def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
     size = np.abs(found[..., 0, 0])
     reference = np.where(size > 1e-9, found[..., 0, 0], found[..., 1, 1])
     phase = np.where(with_phase, 1.0, np.exp(-1j * np.angle(reference)))
-    return JonesMatrices(np.asarray(found * phase[..., None, None]), with_phase)
+    return np.asarray(found * phase[..., None, None]), with_phase
 
 
 def _jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:

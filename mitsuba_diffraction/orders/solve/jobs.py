@@ -124,7 +124,9 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     profile = grating.line
     digest = key_of(
         outline, grating.block, profile.period, profile.x.tolist(), profile.z.tolist(),
-        structure.lengths, [_numbers(medium) for medium in (material, *structure.materials)],
+        [film.thickness for film in structure.films],
+        [(each.thickness, [part[1:] for part in each.parts]) for each in structure.slices],
+        [_numbers(medium) for medium in (material, *structure.materials)],
     )  # fmt: skip
     return Problem(grating, method, resolution, digest, LEAST_COSINES.get(method, LEAST_COSINE))
 
