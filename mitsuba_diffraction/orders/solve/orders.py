@@ -52,6 +52,8 @@ from .stations import Grating
 REFINEMENTS, _FINER = 8, 1.4
 #: Part of the tolerance that Chebyshev nodes keep: some light misses more than random light says.
 _AIMED = 0.5
+#: Part of the tolerance in the last terms of series, up to which more nodes gain nothing.
+_WORTH = 0.25
 #: Part of the error, by the last terms of series along all axes, that a refinement has less of.
 _GAINED = 0.8
 #: Nodes of a first table; of a block each refinement halves the distance between them.
@@ -213,7 +215,7 @@ def _solve_cells(
         missed = missed_tolerance(header, 1.0 if block else _AIMED)
         if not missed or refinement == REFINEMENTS:
             break
-        finer = refined_counts(table)
+        finer = refined_counts(table, _WORTH * how.tolerance)
         most = max(map(max, finer.values()))
         if finer == counts or most > MOST_NODES or _size(grating, finer, elements) > MOST_BYTES:
             break
@@ -237,8 +239,11 @@ def _nodes(grating: Grating) -> Callable[[int], Real]:
     return cells.even_nodes if grating.block else cells.nodes
 
 
-def refined_counts(table: OrderTable) -> dict[int, Counts]:
+def refined_counts(table: OrderTable, worth: float) -> dict[int, Counts]:
     """Return more nodes where the series of efficiencies fall off slowest.
+
+    worth : last terms of all series over the light in orders, at which the nodes stay as they are:
+        then the rest of a table's error is that of its look-up.
 
     Even nodes of blocks are halved in all bands, so that the old ones are nodes again. Elsewhere an
     axis of a band counts by its last two terms, and by the band's share of diffuse white light.
@@ -249,31 +254,33 @@ def refined_counts(table: OrderTable) -> dict[int, Counts]:
     band = cells.to_cell(*diffuse_light(4096, table.wavelengths), table.optical_period).band
     shares = np.bincount(np.minimum(band, size - 1), minlength=size) / len(band)
     left = [[_last_terms(kind, table.sides) for kind in band.kinds] for band in table.bands]
-    missed = np.array([np.max(of_band, axis=0) for of_band in left])
-    missed *= np.maximum(shares, 1.0 / (16 * size))[:, None]
+    most = np.array([np.max(of_band, axis=0) for of_band in left])
+    most *= np.maximum(shares, 1.0 / (16 * size))[:, None]
+    missed, light = most[:, :3], most[:, 3].sum()
+    counts = np.array([band.counts for band in table.bands])
     largest = np.argsort(-missed, axis=None)
     enough = int(np.searchsorted(missed.ravel()[largest].cumsum(), _GAINED * missed.sum())) + 1
     finer = np.isin(np.arange(missed.size), largest[:enough]).reshape(missed.shape)
-    counts = np.array([band.counts for band in table.bands])
+    finer &= missed.sum() > worth * light
     more = np.minimum(np.ceil(_FINER * counts), MOST_NODES).astype(int)
     counts = np.where(finer & (counts > 1), more, counts)
     return {k: Counts(*of_band) for k, of_band in enumerate(counts.tolist())}
 
 
 def _last_terms(values: NDArray[np.float32], sides: int) -> list[float]:
-    """Return the last two terms of series along τ, ρ and w, over the light.
+    """Return the last two terms of series along τ, ρ and w, and the light.
 
     values : (τ, ρ, w, j, q, n) at Chebyshev nodes. Order 0 is no colour, and is left out.
     """
-    light, coloured = max(float(values[..., 0].sum(axis=-1).mean()), 1e-12), values.astype(float)
+    coloured = values.astype(float)
     if (channels := values.shape[3] // sides) > 1:
         coloured *= 1.0 - np.tile(np.eye(channels), (sides, sides))[..., None]
     found = []
     for axis, count in enumerate(values.shape[:3]):
         terms = np.moveaxis(dct(coloured, axis=axis), axis, 0) / count
         last = np.sqrt((terms[-2:] ** 2).sum(axis=(0, -1)))
-        found.append(float(last.sum(axis=-1).mean()) / light if count > 1 else 0.0)
-    return found
+        found.append(float(last.sum(axis=-1).mean()) if count > 1 else 0.0)
+    return [*found, float(coloured[..., 0].sum(axis=-1).mean())]
 
 
 def _lossless(amplitudes: Complex) -> Real:

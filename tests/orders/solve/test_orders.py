@@ -86,9 +86,11 @@ def test_a_table_gets_more_nodes_where_its_efficiencies_change_quickest():
         for band in flat.bands
     ]  # fmt: skip
     table = replace(flat, response=orders.CellResponse(tuple(bands)))
-    *others, last = orders.refined_counts(table).values()
+    *others, last = orders.refined_counts(table, 0.0).values()
     assert others == [(6, 6, 6)] * len(others)
     assert last == (6, 9, 6)
+    # no terms are as large as all light in orders
+    assert set(orders.refined_counts(table, 1.0).values()) == {(6, 6, 6)}
 
 
 def test_the_size_of_a_table_is_announced_before_it_is_solved(announced):
