@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
 from ..arrays import Real
-from ..columns import read_columns
+from ..columns import WAVELENGTH_UNITS, read_columns
 from ..errors import DiffractionError, one_line, quoted, warn
 from ..extras import optional
 from ..files import FileKind, beginning, kind_of, read_bytes
@@ -50,11 +50,9 @@ PAIR = ("order_x", "order_y")
 MOST_ORDER = 1000
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
-_LENGTHS = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3,
-            "micron": 1e3, "m": 1e9, "meter": 1e9}  # fmt: skip
 _ANGLES = {"deg": 1.0, "degree": 1.0, "°": 1.0, "rad": 180.0 / np.pi, "radian": 180.0 / np.pi}
 _UNITS: dict[str, dict[str, float]] = {
-    "wavelength": _LENGTHS, "theta": _ANGLES, "phi": _ANGLES,
+    "wavelength": WAVELENGTH_UNITS | {"meter": 1e9}, "theta": _ANGLES, "phi": _ANGLES,
     **{axis: {"1": 1.0} for axis in ("order", *PAIR)},
 }  # fmt: skip
 _PER_CENT = ("%", "percent", "per cent")
