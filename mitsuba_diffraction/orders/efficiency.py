@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,7 @@ from ..reference.boundary import polarisation_axes, turn
 from .grid import OrderGrid, grid_of
 from .listed import listed_jones
 from .listed_lookup import ListedLookup
-from .lookup import Arrays, BlockLookup, Lookup, Memory, Order
+from .lookup import Arrays, BlockLookup, Lookup, Memory
 from .polarised import IN_PLANE, TurnedAxes, nearest_jones, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
@@ -52,10 +52,8 @@ def efficiency(
     -------
     (…) share of the incident light, 0 for orders that do not propagate.
     """
-    light = x, y, wavelength, order, order_y
-    placed = _placed(table, *light, from_below=from_below, transmitted=transmitted)
-    share = placed.lookup.share(placed.row, placed.order, placed.active, placed.below)
-    return share.efficiency.reshape(placed.shape)
+    light, sides = (x, y, wavelength, order, order_y), (from_below, transmitted)
+    return _answer(table, *light, *sides, matrices=False)[..., 0]
 
 
 def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
@@ -124,7 +122,7 @@ def _linear(table: OrderTable, *light: Any, **sides: bool) -> tuple[Real, Real, 
         raise DiffractionError(
             "this table has efficiencies of unpolarised light alone; take efficiency"
         )
-    parts = np.moveaxis(_elements(table, *light, **sides)[..., :LINEAR], -1, 0)
+    parts = np.moveaxis(_answer(table, *light, **sides)[..., :LINEAR], -1, 0)
     return parts[0], parts[1], parts[2] if len(parts) > ALONG else None
 
 
@@ -189,36 +187,17 @@ def _jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    entries = nearest_jones(list(np.moveaxis(_elements(table, *light), -1, 0)))
+    entries = nearest_jones(list(np.moveaxis(_answer(table, *light), -1, 0)))
     scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(table, *light))[..., None]
     return scaled.reshape(*scaled.shape[:-1], 2, 2)
 
 
-class _Placed(NamedTuple):
-    """Light in a look-up, all flat, and the shape of the answer."""
-
-    lookup: Lookup
-    row: Any
-    order: Order
-    active: NDArray[np.bool_]
-    below: NDArray[np.bool_] | None
-    y: Real
-    shape: tuple[int, ...]
-
-
-def _elements(table: OrderTable, *light: Any, **sides: bool) -> Real:
-    """Return the first elements of the Mueller matrices of an order, (…, n)."""
-    placed = _placed(table, *light, **sides)
-    elements = placed.lookup.elements(
-        placed.row, placed.order, placed.y, placed.active, placed.below
-    )
-    return np.stack(elements, axis=-1).reshape(*placed.shape, -1)
-
-
-def _placed(
+def _answer(
     table: OrderTable, x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, order: ArrayLike,
-    order_y: ArrayLike = 0, *, from_below: bool = False, transmitted: bool = False,
-) -> _Placed:  # fmt: skip
+    order_y: ArrayLike = 0, from_below: bool = False, transmitted: bool = False, *,
+    matrices: bool = True,
+) -> Real:  # fmt: skip
+    """Return the first elements of the Mueller matrices of an order, (…, n), or the efficiency."""
     if (from_below or transmitted) and table.sides == 1:
         raise DiffractionError(
             "this table has reflected light alone; solve the profile with thin for that below"
@@ -237,7 +216,11 @@ def _placed(
     lookup = lookup_of(table)
     row = lookup.row(-x, -y, np.where(second, -1.0, 1.0) + 0.0 * x, np.maximum(lam, 1.0))
     below = np.full(len(x), second != transmitted) if lookup.sides == 2 else None
-    return _Placed(lookup, row, (m_x, m_y), active, below, y, shape)
+    if matrices:
+        answer = lookup.elements(row, (m_x, m_y), y, active, below)
+    else:
+        answer = [lookup.share(row, (m_x, m_y), active, below).efficiency]
+    return np.stack(answer, axis=-1).reshape(*shape, -1)
 
 
 def lookup_in(
