@@ -220,7 +220,7 @@ def _answer(
         answer = lookup.elements(row, (m_x, m_y), y, active, below)
     else:
         answer = [lookup.share(row, (m_x, m_y), active, below).efficiency]
-    return np.stack(answer, axis=-1).reshape(*shape, -1)
+    return np.stack(answer, axis=-1).reshape(*shape, len(answer))
 
 
 def lookup_in(
