@@ -34,7 +34,7 @@ pytestmark = pytest.mark.thorough
 RANGE, LIGHTS = (550.0, 570.0), 60
 #: Profile, material, arguments and settings: with mirror planes and without.
 CASES = {
-    "walls": (lamellar(0.8, 0.45), "Al", {}, {"tolerance": 0.02, "resolution": 12}),
+    "walls": (lamellar(0.8, 0.45), "Al", {}, {"tolerance": 0.01, "resolution": 12}),
     "blazed": (blazed(0.5, 0.15), "Al", {}, {"tolerance": 0.01}),
     "block": (lamellar(0.45, 0.05), 1.5, {"block": True}, {"tolerance": 0.05}),
 }
