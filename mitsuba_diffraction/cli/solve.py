@@ -152,13 +152,12 @@ def run(args: argparse.Namespace) -> Figures:
 def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
     """Return the problem of a recipe and of the options that override it."""
     from ..orders.solve.recipes import SolvedRecipe, profile_of
-    from ..orders.solve.settings import Settings
 
     source, output = Path(args.source), Path(f"{Path(args.source).stem}.nc")
     shape = options.given(args, ("period", "depth", "duty", "direction"))
     if args.crossed:
         options.refuse(args, ("duty", "direction"), ": not allowed with --crossed")
-        recipe = SolvedRecipe(_unit_cell(source, args), "1.5", 1.0, False, Settings(), output)
+        recipe = SolvedRecipe(_unit_cell(source, args), output, "1.5")
     else:
         options.refuse(args, ["period_y"], ": profiles are one-dimensional; add --crossed")
         if source.suffix.lower() in (".nc", ".h5", ".hdf5"):
@@ -170,7 +169,7 @@ def recipe_of(args: argparse.Namespace) -> SolvedRecipe:
             recipe = SolvedRecipe.load(source)
         else:
             profile = profile_of(args.source, shape)
-            recipe = SolvedRecipe(profile, "Al", 1.0, False, Settings(), output)
+            recipe = SolvedRecipe(profile, output)
     changed = options.given(args, _OF_A_RECIPE)
     for name in ("layers", "beneath"):
         if name in changed:
@@ -223,17 +222,9 @@ def solve_recipe(recipe: SolvedRecipe, args: argparse.Namespace) -> OrderTable:
             )
 
         table = solve_orders(
-            recipe.profile,
-            recipe.material,
-            superstrate=recipe.superstrate,
-            thin=recipe.thin,
-            block=recipe.block,
-            layers=recipe.layers,
-            beneath=recipe.beneath,
-            substrate=recipe.substrate,
+            **recipe.arguments(),
             **light,
             step=args.step,
-            settings=recipe.settings,
             jobs=Jobs(folder, calls, bar),
             announce=announce,
         )

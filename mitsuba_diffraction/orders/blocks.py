@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from ..arrays import Real
 from ..optics.coat import face_transmittance
 from ..optics.orders import port_power
-from . import cells
-from .response import Band
+from .cells import Counts
+from .rows import Kind, lights
 from .table import OrderTable
 
 #: Least normal parts, within over n and above, from which on reduced efficiencies are known at a
@@ -53,17 +53,12 @@ def factors(x: Real, y: Real, index: float) -> tuple[Real, NDArray[np.bool_]]:
     return scale, far[..., :, None] & far[..., None, :] & (scale > 0.0)
 
 
-def reduced(table: OrderTable, band: Band, kind: int) -> Real:
+def reduced(table: OrderTable, of: Kind) -> Real:
     """Return the reduced efficiencies e (τ, ρ, w, j, q); 0 in order 0 of the reflection."""
     index = table.block
     assert index is not None
-    values = band.kind(kind)[..., 0].astype(np.float64)
-    tau, rho, w = (cells.even_nodes(n)[..., None] for n in band.counts)
-    tau, rho = tau[:, None, None], rho[:, None]
-    optical = table.optical_period
-    lam = cells.wavelength_of(band.k + cells.sine_squared(rho), w, table.wavelengths, optical)
-    channels = np.arange(values.shape[-1] // 2)
-    light = cells.from_cell(band.k, kind, channels, tau, rho, lam, optical)
+    values = table.bands[of.band].kinds[of.kind][..., 0].astype(np.float64)
+    light = lights(table, of, Counts(*(n - 1 for n in values.shape[:3])), coated=False)
     return divided(values, *factors(index * light.x, index * light.y, index))
 
 

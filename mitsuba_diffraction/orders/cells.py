@@ -36,6 +36,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import ArrayLike
 
 from ..arrays import Real, Whole
@@ -200,17 +201,9 @@ def linear(count: int, at: ArrayLike) -> Real:
 
 
 def interpolation(count: int, at: ArrayLike) -> Real:
-    """Return the matrix that takes values at `nodes(count)` to a polynomial's values, (n, count).
-
-    Barycentric form of the first kind's nodes (Berrut and Trefethen 2004, eq. 4.2 and 5.3).
-    """
-    places = np.asarray(at, np.float64)[..., None]
-    angles = np.pi * (np.arange(count) + 0.5) / count
-    distance = places - nodes(count)
-    exact = np.abs(distance) < _MIN_WIDTH
-    weights = (-1.0) ** np.arange(count) * np.sin(angles) / np.where(exact, 1.0, distance)
-    weights = np.where(exact.any(axis=-1, keepdims=True), exact, weights)
-    return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
+    """Return the matrix (n, count) that takes values at `nodes(count)` to a polynomial's values."""
+    terms, known = (chebvander(2.0 * np.asarray(x) - 1.0, count - 1) for x in (at, nodes(count)))
+    return np.asarray(terms @ np.linalg.inv(known))
 
 
 def sine_squared(tau: ArrayLike) -> Real:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,19 +20,6 @@ from .lookup import Arrays, BlockLookup, Lookup, Memory
 from .polarised import IN_PLANE, TurnedAxes, nearest_jones, turned_axes
 from .response import ALONG, LINEAR, UNPOLARISED, ListedResponse
 from .table import OrderTable
-
-
-class _Light(NamedTuple):
-    """Light and the order that is looked up, as the parameters of `efficiency`."""
-
-    table: OrderTable
-    x: ArrayLike
-    y: ArrayLike
-    wavelength: ArrayLike
-    order: ArrayLike
-    order_y: ArrayLike = 0
-    from_below: bool = False
-    transmitted: bool = False
 
 
 def efficiency(
@@ -65,10 +52,8 @@ def efficiency(
     -------
     (…) share of the incident light, 0 for orders that do not propagate.
     """
-    light = _Light(table, x, y, wavelength, order, order_y, from_below, transmitted)
-    placed = _placed(light)
-    share = placed.lookup.share(placed.row, placed.order, placed.active, placed.below)
-    return share.efficiency.reshape(placed.shape)
+    light, sides = (x, y, wavelength, order, order_y), (from_below, transmitted)
+    return _answer(table, *light, *sides, matrices=False)[..., 0]
 
 
 def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
@@ -80,9 +65,8 @@ def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
     coherent sums of the table's components, if a solved table has no Mueller matrices; or as
     `efficiency` does.
     """
-    at = _Light(table, *light, **sides)
-    mean, cosine, sine = _linear(at)
-    turned = _turned(at)
+    mean, cosine, sine = _linear(table, *light, **sides)
+    turned = _turned(*light)
     difference = cosine * turned.cosine
     if sine is None:
         if np.any((np.abs(turned.sine) > IN_PLANE) & (mean > 0.0)):
@@ -93,8 +77,7 @@ def polarised_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
             )
     else:
         difference = difference + turned.sine * sine
-    difference = np.clip(difference, -mean, mean)
-    return np.stack([mean + difference, mean - difference], axis=-1)
+    return _both(mean, difference)
 
 
 def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
@@ -106,29 +89,40 @@ def groove_efficiency(table: OrderTable, *light: Any, **sides: bool) -> Real:
     Raises a DiffractionError for conical light, if the table is imported from efficiencies of s and
     p; or as for `efficiency`.
     """
-    at = _Light(table, *light, **sides)
-    mean, difference, _ = _linear(at)
-    turned = np.abs(_turned(at).sine) > IN_PLANE
+    mean = _linear(table, *light, **sides)[0]
+    turned = np.abs(_turned(*light).sine) > IN_PLANE
     if table.response.elements == LINEAR and np.any(turned & (mean > 0.0)):
         raise DiffractionError(
             "this table is imported, with s and p; of conical light it lacks the phases from which "
             "E and B along the grooves would follow"
         )
+    return shares_along(table, *light, **sides)
+
+
+def shares_along(table: OrderTable, *light: Any, **sides: bool) -> Real:
+    """Return `groove_efficiency` of any table; (…, 1) of a table of unpolarised light."""
+    if table.response.elements == UNPOLARISED:
+        return efficiency(table, *light, **sides)[..., None]
+    return _both(*_linear(table, *light, **sides)[:2])
+
+
+def _both(mean: Real, difference: Real) -> Real:
+    """Return the shares (…, 2) of two polarisations by their mean, and half of their difference."""
     difference = np.clip(difference, -mean, mean)
     return np.stack([mean + difference, mean - difference], axis=-1)
 
 
-def _turned(light: _Light) -> TurnedAxes:
-    return turned_axes(np.asarray(light.x, np.float64), np.asarray(light.y, np.float64))
+def _turned(x: ArrayLike, y: ArrayLike, *_: Any) -> TurnedAxes:
+    return turned_axes(np.asarray(x, np.float64), np.asarray(y, np.float64))
 
 
-def _linear(light: _Light) -> tuple[Real, Real, Real | None]:
+def _linear(table: OrderTable, *light: Any, **sides: bool) -> tuple[Real, Real, Real | None]:
     """Return M₀₀, M₀₁ and M₀₂ of an order; None for the last one where it is not known."""
-    if light.table.response.elements == UNPOLARISED:
+    if table.response.elements == UNPOLARISED:
         raise DiffractionError(
             "this table has efficiencies of unpolarised light alone; take efficiency"
         )
-    parts = np.moveaxis(_elements(light)[..., :LINEAR], -1, 0)
+    parts = np.moveaxis(_answer(table, *light, **sides)[..., :LINEAR], -1, 0)
     return parts[0], parts[1], parts[2] if len(parts) > ALONG else None
 
 
@@ -140,23 +134,20 @@ def mueller(table: OrderTable, *light: Any) -> Real:
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    return mueller_matrices(_jones(_Light(table, *light)))
-
-
-class JonesMatrices(NamedTuple):
-    """Jones matrices (…, 2, 2), and whether the table has their common phase (…)."""
-
-    matrices: NDArray[np.complex128]
-    with_phase: NDArray[np.bool_]
+    return mueller_matrices(_jones(table, *light))
 
 
 def jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     """Return `jones_matrices` alone."""
-    return jones_matrices(table, *light).matrices
+    return jones_matrices(table, *light)[0]
 
 
-def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
+def jones_matrices(
+    table: OrderTable, *light: Any
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Return the Jones matrices of an order about s and p, as ray tracers take them.
+
+    (…, 2, 2), and whether the table has their common phase (…).
 
     E_leaving = J E_incident times the root of the ratio of cosines: |J|² are shares of the light.
     s = ẑ × d/|ẑ × d| and p = d × s of each direction of propagation d. Time is exp(−iωt), and
@@ -167,11 +158,11 @@ def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
 
     Raises a DiffractionError if the table has no Mueller matrices.
     """
-    at = _Light(table, *light)
-    exact = listed_jones(*at[:6])
+    at = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in (*light, 0.0)[:5]))
+    exact = listed_jones(table, *at)
     with_phase = np.isfinite(exact[..., 0, 0])
-    of_grooves = np.where(with_phase[..., None, None], exact, _jones(at))
-    x, y, lam, m_x, m_y = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in at[1:6]))
+    of_grooves = np.where(with_phase[..., None, None], exact, _jones(table, *at))
+    x, y, lam, m_x, m_y = at
     steps = (1e-3 * lam / (period * table.superstrate) for period in table.periods)
     shifts = (m * step for m, step in zip((m_x, m_y), steps, strict=True))
     leaving = tuple(part + shift for part, shift in zip((x, y), shifts, strict=True))
@@ -186,51 +177,33 @@ def jones_matrices(table: OrderTable, *light: Any) -> JonesMatrices:
     size = np.abs(found[..., 0, 0])
     reference = np.where(size > 1e-9, found[..., 0, 0], found[..., 1, 1])
     phase = np.where(with_phase, 1.0, np.exp(-1j * np.angle(reference)))
-    return JonesMatrices(np.asarray(found * phase[..., None, None]), with_phase)
+    return np.asarray(found * phase[..., None, None]), with_phase
 
 
-def _jones(light: _Light) -> NDArray[np.complex128]:
+def _jones(table: OrderTable, *light: Any) -> NDArray[np.complex128]:
     """Return the Jones matrices (…, 2, 2) of an order about e and f; any phase."""
-    if not light.table.polarised:
+    if not table.polarised:
         raise DiffractionError(
             "this table has efficiencies alone; solve the profile with polarised=True for Mueller "
             "matrices"
         )
-    entries = nearest_jones(list(np.moveaxis(_elements(light), -1, 0)))
-    scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(*light[:6]))[..., None]
+    entries = nearest_jones(list(np.moveaxis(_answer(table, *light), -1, 0)))
+    scaled = np.stack(entries, axis=-1) * np.sqrt(efficiency(table, *light))[..., None]
     return scaled.reshape(*scaled.shape[:-1], 2, 2)
 
 
-class _Placed(NamedTuple):
-    """Light in a look-up, all flat, and the shape of the answer."""
-
-    lookup: Lookup
-    row: Any
-    order: Any
-    active: NDArray[np.bool_]
-    below: NDArray[np.bool_] | None
-    y: Real
-    shape: tuple[int, ...]
-
-
-def _elements(light: _Light) -> Real:
-    """Return the first elements of the Mueller matrices of an order, (…, n)."""
-    placed = _placed(light)
-    elements = placed.lookup.elements(
-        placed.row, placed.order, placed.y, placed.active, placed.below
-    )
-    return np.stack(elements, axis=-1).reshape(*placed.shape, -1)
-
-
-def _placed(light: _Light) -> _Placed:
-    table, x, y, wavelength, m_x, m_y, from_below, transmitted = light
+def _answer(
+    table: OrderTable, x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, order: ArrayLike,
+    order_y: ArrayLike = 0, from_below: bool = False, transmitted: bool = False, *,
+    matrices: bool = True,
+) -> Real:  # fmt: skip
+    """Return the first elements of the Mueller matrices of an order, (…, n), or the efficiency."""
     if (from_below or transmitted) and table.sides == 1:
         raise DiffractionError(
             "this table has reflected light alone; solve the profile with thin for that below"
         )
-    parts = np.broadcast_arrays(
-        *(np.asarray(value, np.float64) for value in (x, y, wavelength, m_x, m_y))
-    )
+    light = x, y, wavelength, order, order_y
+    parts = np.broadcast_arrays(*(np.asarray(part, np.float64) for part in light))
     shape = parts[0].shape
     x, y, lam, m_x, m_y = (part.ravel() for part in parts)
     second = from_below != bool(table.block)  # whether the light's ports are the second half
@@ -243,19 +216,21 @@ def _placed(light: _Light) -> _Placed:
     lookup = lookup_of(table)
     row = lookup.row(-x, -y, np.where(second, -1.0, 1.0) + 0.0 * x, np.maximum(lam, 1.0))
     below = np.full(len(x), second != transmitted) if lookup.sides == 2 else None
-    order = (m_x, m_y) if table.crossed else m_x
-    return _Placed(lookup, row, order, active, below, y, shape)
+    if matrices:
+        answer = lookup.elements(row, (m_x, m_y), y, active, below)
+    else:
+        answer = [lookup.share(row, (m_x, m_y), active, below).efficiency]
+    return np.stack(answer, axis=-1).reshape(*shape, len(answer))
 
 
 def lookup_in(
-    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool,
-    chances: bool = False,
-) -> Lookup:  # fmt: skip
+    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool
+) -> Lookup:
     """Return the look-up of a table, with its grid in a memory.
 
-    coated, elements, chances : as for `grid.grid_of`.
+    coated, elements : as for `grid.grid_of`.
     """
-    grid = grid_of(table, coated=coated, elements=elements, chances=chances)
+    grid = grid_of(table, coated=coated, elements=elements)
     held = memory(grid)
     coated = coated and table.superstrate != 1.0
     if isinstance(table.response, ListedResponse) and not coated:

@@ -11,8 +11,8 @@ polarised light has `phase`, radians, over all of them but `element`.
 Global attributes hold the rest: `period` (µm), `period_y` (of a crossed grating; else left out),
 `wavelengths` (nm, in vacuum), `superstrate` (index), `thin` (1 for a sheet, whose `j` and `q` are
 ports of `cells`), `block` (index of a block, with the ports of `blocks`), `even` (1 for even nodes,
-else Chebyshev nodes), `in_plane` (1 for listed light of one plane), `index` (of the material, see
-`ListedResponse`), `header` (JSON), `version`, and `sha256` of the table's digest and header.
+else Chebyshev nodes), `index` (of the material, see `ListedResponse`), `header` (JSON), `version`,
+and `sha256` of the table's digest and header.
 Attributes that do not apply are left out.
 """
 
@@ -84,8 +84,6 @@ def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
 def _add_response(file: Any, table: OrderTable) -> None:
     response = table.response
     if isinstance(response, ListedResponse):
-        if response.in_plane:
-            file.in_plane = np.int32(1)
         if response.index:
             file.index = np.float64(response.index)
         axes = zip(
@@ -179,7 +177,6 @@ def _table(file: Any) -> OrderTable:
         orders = [file.variables[name][:].astype(np.int64) for name in ("order_x", "order_y")]
         response: CellResponse | ListedResponse = ListedResponse(
             (axes[0], axes[1], axes[2]), np.column_stack(orders), _floats(file, _LISTED),
-            bool(getattr(file, "in_plane", False)),
             float(file.index) if hasattr(file, "index") else None,
             _floats(file, _PHASES) if _PHASES in file.variables else None,
         )  # fmt: skip

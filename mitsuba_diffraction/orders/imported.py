@@ -1,6 +1,6 @@
 """`read_orders`: the table of a file of efficiencies of s and p, as of another program or a bench.
 
-Efficiencies of s and p become elements of Mueller matrices about the axes of the grooves
+Lights of s and p become elements of Mueller matrices about the axes of the grooves
 (`polarised`), which have no special place at the normal: M₀₁ = ½(η_s − η_p) cos 2ψ and
 M₀₂ = ½(η_s − η_p) sin 2ψ, with ψ from the axis e to that of s (`polarised.turned_axes`).
 """
@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from ..arrays import Real
 from ..errors import DiffractionError, warn
 from ..optics.orders import crossed_square
-from .listed import Lights, listed_response, listed_table, mirror_of, warn_of_gaps
-from .lists import ROUNDING, Efficiencies, read_efficiencies
+from .listed import Lights, listed_response, mirror_of, warn_of_gaps
+from .lists import ROUNDING, read_efficiencies
 from .polarised import MIN_ANGLE, turned_axes
 from .response import LARGEST_SUM, ListedResponse, canonical, orders_between
 from .table import OrderTable, check_outline
@@ -38,51 +38,13 @@ _REPEATED = 1e-3
 _COUNTED = 1e-9
 
 
-def imported_table(
-    grid: Efficiencies, periods: tuple[float, float], superstrate: float, shown: str,
-    header: dict[str, Any],
-) -> OrderTable:  # fmt: skip
-    """Return the table of a file's efficiencies; its errors are added to the header.
-
-    shown : source of the grid, for messages. Raises a DiffractionError as `read_orders` does.
-    """
-    ends = float(grid.wavelengths[0]), float(grid.wavelengths[-1])
-    thin, crossed = grid.values.shape[-1] == 4, grid.orders.ndim == 2
-    if thin and crossed:
-        raise DiffractionError(
-            f"{shown} has T_s and T_p: tables of crossed gratings hold reflected light alone; "
-            "leave these columns out"
-        )
-    check_outline(periods, ends, superstrate, thin, listed=True)
-    orders = grid.orders if crossed else np.column_stack([grid.orders, 0 * grid.orders])
-    _check_orders(grid, orders, periods, superstrate, shown)
-    _check_repeated(grid, shown)
-    values = np.where(np.isnan(grid.values), np.nan, np.maximum(grid.values, 0.0))
-    lights = Lights(
-        grid.wavelengths, grid.theta, grid.phi, orders, _elements(values, grid, crossed)
-    )
-    if thin:
-        table = _sheet(listed_response(lights, periods, superstrate), periods, ends, header)
-    else:
-        table = listed_table(lights, periods, header, superstrate=superstrate)
-    warn_of_gaps(table, shown)
-    header |= _errors(table, grid, orders, values)
-    if header["reciprocity_error"] > _ONE_WAY:
-        warn(
-            f"light and reversed light differ by {header['reciprocity_error']:.0%} in {shown}, "
-            "which no grating does: efficiencies are shares of power, |amplitude|² times the ratio "
-            "of cosines; check that, and the signs of the orders and of phi"
-        )
-    return replace(table, header=header)
-
-
 def _placed(theta: Real, phi: Real, crossed: bool) -> tuple[Real, Real]:
     """Return the mirror direction of light; of grooves the image with y at least 0."""
     x, y = mirror_of(theta, phi)
     return x, y if crossed else np.abs(y)
 
 
-def _elements(values: Real, grid: Efficiencies, crossed: bool) -> Real:
+def _elements(values: Real, grid: Lights, crossed: bool) -> Real:
     """Return elements (a, b, c, 1, sides, m, 3) of efficiencies (a, b, c, m, 2 or 4)."""
     sides = np.stack(np.split(values, values.shape[-1] // 2, axis=-1), axis=3)
     mean, half = sides.mean(axis=-1), 0.5 * (sides[..., 0] - sides[..., 1])
@@ -132,11 +94,10 @@ def _sheet(
 
 
 def _check_orders(
-    grid: Efficiencies, orders: NDArray[np.int64], periods: tuple[float, float],
-    superstrate: float, shown: str,
-) -> None:  # fmt: skip
+    grid: Lights, periods: tuple[float, float], superstrate: float, shown: str
+) -> None:
     """Refuse light in evanescent orders, orders that propagate without light, and sums above 1."""
-    crossed = grid.orders.ndim == 2
+    crossed, orders = grid.crossed, grid.orders
     lam, theta, phi = (
         axis.ravel() for axis in np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     )
@@ -155,7 +116,7 @@ def _check_orders(
     if len(extra := np.argwhere((powers.max(axis=-1) > ROUNDING) & (square(orders) < -_EDGE))):
         light, place = map(int, extra[0])
         raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {_shown(orders[place], crossed)} does not "
+            f"{shown}, {grid.light(light)}: order {grid.order(place)} does not "
             f"propagate; check {signs}"
         )
     most = [int(np.ceil(2.0 / float(step.min()))) if step.min() > 0.0 else 0 for step in steps]
@@ -167,8 +128,9 @@ def _check_orders(
             lacking[:, column] &= np.isnan(values[:, known[order]]).any(axis=-1)
     if lacking.any():
         light, place = map(int, np.argwhere(lacking)[0])
+        order = tuple(every[place].tolist())
         raise DiffractionError(
-            f"{shown}, {grid.light(light)}: order {_shown(every[place], crossed)} propagates, and "
+            f"{shown}, {grid.light(light)}: order {order if crossed else order[0]} propagates, and "
             "has no efficiencies; list it, with 0 if it has no light"
         )
     sums = powers.reshape(*powers.shape[:2], -1, 2).sum(axis=(1, 2)).max(axis=-1)
@@ -179,7 +141,7 @@ def _check_orders(
         )
 
 
-def _check_repeated(grid: Efficiencies, shown: str) -> None:
+def _check_repeated(grid: Lights, shown: str) -> None:
     """Refuse a direction that is there in other words with other efficiencies."""
     theta, phi = (part.ravel() for part in canonical(grid.theta, grid.phi, True))
     names = np.stack(np.meshgrid(grid.theta, grid.phi, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -195,13 +157,7 @@ def _check_repeated(grid: Efficiencies, shown: str) -> None:
             )
 
 
-def _shown(order: NDArray[np.int64], crossed: bool) -> str:
-    return f"({order[0]}, {order[1]})" if crossed else str(order[0])
-
-
-def _errors(
-    table: OrderTable, grid: Efficiencies, orders: NDArray[np.int64], values: Real
-) -> dict[str, Any]:
+def _errors(table: OrderTable, grid: Lights, values: Real) -> dict[str, Any]:
     """Compare a table with its list, per order and polarisation, and light with reversed light.
 
     Reversed light is compared in all orders but 0, reflected: η_m(ωi) = η_m(−ωo), where the list
@@ -210,7 +166,8 @@ def _errors(
     lam, theta, phi = np.meshgrid(grid.wavelengths, grid.theta, grid.phi, indexing="ij")
     level = np.where(theta == 0.0, MIN_ANGLE, theta)
     x, y = (part[..., None] for part in _placed(level, phi, table.crossed))
-    light = x, y, lam[..., None], orders[:, 0], orders[:, 1]
+    orders = grid.orders
+    light = x, y, lam[..., None], *orders.T
     got = [table.polarised_efficiency(*light)]
     if table.thin:
         got.append(table.polarised_efficiency(*light, transmitted=True))
@@ -220,8 +177,7 @@ def _errors(
     every = np.ones(truth.size // truth.shape[-1], bool).reshape(-1, len(orders))
 
     def place(light: int, order: int, kind: int) -> str:
-        shown = _shown(orders[order], table.crossed)
-        return f"{grid.light(light)}, order {shown}, {'RT'[kind // 2]}_{'sp'[kind % 2]}"
+        return f"{grid.light(light)}, order {grid.order(order)}, {'RT'[kind // 2]}_{'sp'[kind % 2]}"
 
     error = table_error(found.reshape(shape), truth.reshape(shape), every, _COUNTED, place)
     others = (orders != 0).any(axis=1)
@@ -272,7 +228,7 @@ def read_orders(
         "solver": f"imported from {Path(path).name}", "material": "unknown", "profile": "unknown",
     }  # fmt: skip
     grid, shown = read_efficiencies(path), repr(os.fspath(path))
-    if grid.orders.ndim == 2:
+    if grid.crossed:
         periods = period if isinstance(period, tuple) else (period, period)
     elif isinstance(period, tuple):
         raise DiffractionError(
@@ -281,4 +237,29 @@ def read_orders(
         )
     else:
         periods = period, math.inf
-    return imported_table(grid, periods, superstrate, shown, header)
+    ends = float(grid.wavelengths[0]), float(grid.wavelengths[-1])
+    thin, crossed = grid.values.shape[-1] == 4, grid.crossed
+    if thin and crossed:
+        raise DiffractionError(
+            f"{shown} has T_s and T_p: tables of crossed gratings hold reflected light alone; "
+            "leave these columns out"
+        )
+    check_outline(periods, ends, superstrate, thin, listed=True)
+    _check_orders(grid, periods, superstrate, shown)
+    _check_repeated(grid, shown)
+    values = np.where(np.isnan(grid.values), np.nan, np.maximum(grid.values, 0.0))
+    lights = grid._replace(values=_elements(values, grid, crossed))
+    response = listed_response(lights, periods, superstrate)
+    if thin:
+        table = _sheet(response, periods, ends, header)
+    else:
+        table = OrderTable(periods, ends, response, superstrate, header)
+    warn_of_gaps(table, shown)
+    header |= _errors(table, grid, values)
+    if header["reciprocity_error"] > _ONE_WAY:
+        warn(
+            f"light and reversed light differ by {header['reciprocity_error']:.0%} in {shown}, "
+            "which no grating does: efficiencies are shares of power, |amplitude|² times the ratio "
+            "of cosines; check that, and the signs of the orders and of phi"
+        )
+    return replace(table, header=header)

@@ -28,15 +28,16 @@ WIDEST_STEP = 10.0
 
 
 class Lights(NamedTuple):
-    """Response of a grid of lights.
+    """Response of a regular grid of lights.
 
     Attributes
     ----------
     wavelengths, theta, phi : (a,), (b,), (c,) nm in vacuum, and degrees within the medium of the
         light; θ below 0 is light from the other side, φ + 180°.
-    orders : (m, 2), m_x and m_y.
+    orders : (m, 2), m_x and m_y; m_y is 0 of grooves.
     values : (a, b, c, sides in, sides out, m, n) elements of Mueller matrices, as of
         `ListedResponse.values`; NaN where an order does not propagate.
+    crossed : whether the grating repeats along y, too.
     jones : (a, b, c, sides in, sides out, m, 4) Jones matrices of all 16 elements, times any
         positive number: their phases are stored; None where phases are not known.
     """
@@ -46,7 +47,18 @@ class Lights(NamedTuple):
     phi: Real
     orders: NDArray[np.int64]
     values: Real
+    crossed: bool
     jones: Complex | None = None
+
+    def light(self, number: int) -> str:
+        """Return the name of a light, by its place in the grid of wavelengths, θ and φ."""
+        a, b, c = np.unravel_index(number, self.values.shape[:3])
+        return f"{self.wavelengths[a]:g} nm, theta {self.theta[b]:g}°, phi {self.phi[c]:g}°"
+
+    def order(self, number: int) -> str:
+        """Return the name of an order, by its place among them."""
+        order = tuple(self.orders[number].tolist())
+        return str(order if self.crossed else order[0])
 
 
 def mirror_of(theta: ArrayLike, phi: ArrayLike) -> tuple[Real, Real]:
@@ -55,26 +67,11 @@ def mirror_of(theta: ArrayLike, phi: ArrayLike) -> tuple[Real, Real]:
     return np.asarray(-sine * np.cos(turn)), np.asarray(-sine * np.sin(turn))
 
 
-def listed_table(
-    lights: Lights,
-    periods: tuple[float, float],
-    header: dict[str, Any],
-    *,
-    superstrate: float = 1.0,
-    thin: bool = False,
-    block: float | None = None,
-) -> OrderTable:
-    """Return the table of a grid of lights; other arguments as of `OrderTable`."""
-    response = listed_response(lights, periods, superstrate, block)
-    ends = float(lights.wavelengths[0]), float(lights.wavelengths[-1])
-    return OrderTable(periods, ends, response, superstrate, header, thin, block)
-
-
 def listed_response(
     lights: Lights, periods: tuple[float, float], superstrate: float, block: float | None = None
 ) -> ListedResponse:
     """Return the lights on a grid without gaps."""
-    crossed = bool(np.isfinite(periods[1]))
+    crossed = lights.crossed
     theta, phi = canonical(lights.theta, lights.phi, crossed)
     polar = np.unique(theta)
     azimuths = np.unique(phi[theta > 0.0]) if (theta > 0.0).any() else np.zeros(1)
@@ -116,13 +113,12 @@ def listed_response(
         factor = index if block and side == 0 else 1.0
         light = values[:, :, :, side].reshape(*values.shape[:3], left * len(orders), n)
         stored[:, :, :, side] = _filled(light, axes, np.tile(orders, (left, 1)), optical, factor)
-    in_plane = not crossed and bool(np.isin(azimuths, (0.0, 180.0)).all())
     phases = None
     if lights.jones is not None:
         entries = matrices.view(np.complex128).reshape(*stored.shape[:-1], 4)
         angles = np.angle((_pure(stored).conj() * entries).sum(axis=-1))
         phases = np.where(np.isnan(angles), np.float32(np.nan), angles.astype(np.float32))
-    return ListedResponse(axes, orders, stored, in_plane, phases=phases)
+    return ListedResponse(axes, orders, stored, phases=phases)
 
 
 def _pure(elements: NDArray[np.float32]) -> Complex:

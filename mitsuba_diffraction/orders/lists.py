@@ -32,11 +32,12 @@ from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
 from ..arrays import Real
-from ..columns import read_columns
+from ..columns import WAVELENGTH_UNITS, read_columns
 from ..errors import DiffractionError, one_line, quoted, warn
 from ..extras import optional
 from ..files import FileKind, beginning, kind_of, read_bytes
 from ..limits import MOST_EFFICIENCIES, bounded_memory, check_content
+from .listed import Lights
 from .response import LARGEST_SUM
 from .table import WAVELENGTHS
 
@@ -49,38 +50,13 @@ PAIR = ("order_x", "order_y")
 MOST_ORDER = 1000
 #: Light below which an efficiency is 0 but for a solver's rounding, negative ones too.
 ROUNDING = 1e-6
-_LENGTHS = {"nm": 1.0, "nanometer": 1.0, "um": 1e3, "µm": 1e3, "μm": 1e3, "micrometer": 1e3,
-            "micron": 1e3, "m": 1e9, "meter": 1e9}  # fmt: skip
 _ANGLES = {"deg": 1.0, "degree": 1.0, "°": 1.0, "rad": 180.0 / np.pi, "radian": 180.0 / np.pi}
 _UNITS: dict[str, dict[str, float]] = {
-    "wavelength": _LENGTHS, "theta": _ANGLES, "phi": _ANGLES,
+    "wavelength": WAVELENGTH_UNITS | {"meter": 1e9}, "theta": _ANGLES, "phi": _ANGLES,
     **{axis: {"1": 1.0} for axis in ("order", *PAIR)},
 }  # fmt: skip
 _PER_CENT = ("%", "percent", "per cent")
 _BEGINS_HDF5 = b"\x89HDF\r\n\x1a\n"
-
-
-class Efficiencies(NamedTuple):
-    """Efficiencies on a regular grid of light.
-
-    Attributes
-    ----------
-    wavelengths, theta, phi : (a,), (b,), (c,) ascending; nm in vacuum, degrees.
-    orders : (m,) whole numbers, ascending; (m, 2) of a crossed grating.
-    values : (a, b, c, m, 2) reflected, or (a, b, c, m, 4) reflected and transmitted, of light of s
-        and of p polarisation; NaN where the file has none.
-    """
-
-    wavelengths: Real
-    theta: Real
-    phi: Real
-    orders: NDArray[np.int64]
-    values: Real
-
-    def light(self, number: int) -> str:
-        """Return the name of a light, by its place in the grid of wavelengths, θ and φ."""
-        a, b, c = np.unravel_index(number, self.values.shape[:3])
-        return f"{self.wavelengths[a]:g} nm, theta {self.theta[b]:g}°, phi {self.phi[c]:g}°"
 
 
 class Variable(NamedTuple):
@@ -96,8 +72,11 @@ def axes_of(names: Collection[str]) -> tuple[str, ...]:
     return AXES if set(PAIR).isdisjoint(names) else (*AXES[:3], *PAIR)
 
 
-def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
+def read_efficiencies(path: str | os.PathLike[str]) -> Lights:
     """Read a file of efficiencies; see the module.
+
+    Values of the lights are (a, b, c, m, 2) reflected, or (a, b, c, m, 4) reflected and transmitted
+    shares of light of s and of p polarisation; NaN where the file has none.
 
     Raises a DiffractionError if the file cannot be read, lacks a column or variable, has an unknown
     unit, a hole in its grid, an order twice, or numbers out of range.
@@ -122,66 +101,22 @@ def read_efficiencies(path: str | os.PathLike[str]) -> Efficiencies:
     return grid
 
 
-def _of_lines(path: str | os.PathLike[str], shown: str) -> Efficiencies:
+def _of_lines(path: str | os.PathLike[str], shown: str) -> Lights:
     """Return the grid of a text of columns with names."""
     columns = read_columns(path)
     if not len(columns.numbers):
         raise DiffractionError(f"{shown} has no lines of efficiencies")
-    names = columns.names
-    kinds = _kinds(list(names), shown, "column")
-    crossed = not set(PAIR).isdisjoint(names)
-    axes = [name for name in CSV_AXES[:3] if name != "phi_deg" or name in names]
-    axes += PAIR if crossed else CSV_AXES[3:]
+    kinds = _kinds(list(columns.names), shown, "column")
+    axes = [name for name in CSV_AXES[:3] if name != "phi_deg" or name in columns.names]
+    axes += axes_of(columns.names)[3:]
     table = columns.of((*axes, *kinds))
     if "phi_deg" not in axes:
         table = np.insert(table, 2, 0.0, axis=1)
-    if not crossed:
-        return _regular(table[:, :4], table[:, 4:], shown)
-    _check_orders(table[:, 3:5].ravel(), shown)
-    pairs, numbers = np.unique(table[:, 3:5].astype(np.int64), axis=0, return_inverse=True)
-    return _regular(np.column_stack([table[:, :3], numbers]), table[:, 5:], shown, pairs)
+    lights, powers = np.split(table, [-len(kinds)], axis=1)
+    return _regular(lights, powers, shown)
 
 
-def _regular(
-    lights: Real, powers: Real, shown: str, pairs: NDArray[np.int64] | None = None
-) -> Efficiencies:
-    """Put lines on the grid that they form: (n, 4) coordinates, (n, 2) or (n, 4) efficiencies.
-
-    pairs : orders of a crossed grating, if the last coordinate numbers them.
-    """
-    _check_axes(list(lights.T), shown)
-    axes, places = zip(
-        *(np.unique(column, return_inverse=True) for column in lights.T), strict=True
-    )
-    shape = tuple(map(len, axes))
-    light = np.ravel_multi_index(places[:3], shape[:3])
-    listed = np.unique(light)
-    holes = np.flatnonzero(listed != np.arange(len(listed)))
-    if len(listed) < np.prod(shape[:3], dtype=float):
-        hole = np.unravel_index(holes[0] if len(holes) else len(listed), shape[:3])
-        lam, theta, phi = (axis[place] for axis, place in zip(axes, hole, strict=False))
-        raise DiffractionError(
-            f"{shown} has a hole: no line for {lam:g} nm, theta {theta:g}°, phi {phi:g}°; "
-            "wavelengths and angles must form a regular grid"
-        )
-    _check_size(shape, powers.shape[1], shown)
-    values = np.full((*shape, powers.shape[1]), np.nan)
-    flat = values.reshape(-1, powers.shape[1])
-    place = light * shape[3] + places[3]
-    numbers, counts = np.unique(place, return_counts=True)
-    orders = axes[3].astype(np.int64) if pairs is None else pairs
-    grid = Efficiencies(axes[0], axes[1], axes[2], orders, values)
-    if (counts > 1).any():
-        twice = int(numbers[counts > 1][0])
-        raise DiffractionError(
-            f"{shown}, {grid.light(twice // shape[3])}: order {grid.orders[twice % shape[3]]} is "
-            "listed twice"
-        )
-    flat[place] = powers
-    return grid
-
-
-def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
+def _of_variables(variables: dict[str, Variable], shown: str) -> Lights:
     """Return the grid of a NetCDF file's variables."""
     kinds = _kinds(list(variables), shown, "variable")
     every = axes_of(variables)
@@ -195,7 +130,8 @@ def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
                 "efficiencies are"
             )
         axes[axis] = variables[axis].values * _factor(axis, variables[axis].units, shown)
-    parts = []
+    _check_size([len(axes[axis]) for axis in every], len(kinds), shown)
+    powers = []
     for kind in kinds:
         variable = variables[kind]
         if sorted(variable.dimensions) != sorted(dimensions):
@@ -205,28 +141,57 @@ def _of_variables(variables: dict[str, Variable], shown: str) -> Efficiencies:
             )
         values = variable.values.transpose([variable.dimensions.index(d) for d in dimensions])
         scale = 0.01 if variable.units.strip().lower() in _PER_CENT else 1.0
-        parts.append(scale * values.reshape([len(axes[axis]) for axis in every]))
-    _check_size(parts[0].shape, len(parts), shown)
-    values = np.stack(parts, axis=-1)
-    for n, axis in enumerate(every):
-        along = axes[axis]
-        if not np.isfinite(along).all() or len(np.unique(along)) < len(along):
-            raise DiffractionError(f"{shown}: all {axis} must be different, finite numbers")
-        values = values.take(np.argsort(along), axis=n)
-        axes[axis] = np.sort(along)
-    wavelengths, theta, phi, *of_orders = (axes[axis] for axis in every)
-    _check_axes([wavelengths, theta, phi, np.concatenate(of_orders)], shown)
-    orders: NDArray[np.int64] = of_orders[0].astype(np.int64)
-    if every != AXES:
-        pairs = np.meshgrid(*of_orders, indexing="ij")
-        orders = np.stack(pairs, axis=-1).reshape(-1, 2).astype(np.int64)
-        values = values.reshape(*values.shape[:3], len(orders), -1)
+        powers.append(scale * values.ravel())
     if unknown := [axis for axis in dimensions if axis in AXES[:3] and not variables[axis].units]:
         warn(
             f"{shown}: {', '.join(unknown)} without units: wavelengths are taken to be in nm, "
             "angles in degrees"
         )
-    return Efficiencies(wavelengths, theta, phi, orders, values)
+    lights = np.meshgrid(*(axes[axis] for axis in every), indexing="ij")
+    columns = np.column_stack([part.ravel() for part in lights])
+    return _regular(columns, np.column_stack(powers), shown)
+
+
+def _regular(lights: Real, powers: Real, shown: str) -> Lights:
+    """Put lines on the grid that they form.
+
+    lights : (n, 4) coordinates, or (n, 5) of a crossed grating, as `axes_of` has them.
+    powers : (n, 2) or (n, 4) efficiencies.
+    """
+    check_light(lights[:, 0], lights[:, 1], lights[:, 2], shown)
+    numbers = lights[:, 3:].ravel()
+    whole = (numbers == np.round(numbers)) & (np.abs(numbers) <= MOST_ORDER)
+    _check_all("order", numbers, whole, f"a whole number of at most {MOST_ORDER}", shown)
+    axes, places = zip(
+        *(np.unique(column, return_inverse=True) for column in lights.T[:3]), strict=True
+    )
+    orders, column = np.unique(lights[:, 3:].astype(np.int64), axis=0, return_inverse=True)
+    shape = (*map(len, axes), len(orders))
+    light = np.ravel_multi_index(places, shape[:3])
+    listed = np.unique(light)
+    if len(listed) < np.prod(shape[:3], dtype=float):
+        holes = np.flatnonzero(listed != np.arange(len(listed)))
+        hole = np.unravel_index(holes[0] if len(holes) else len(listed), shape[:3])
+        lam, theta, phi = (axis[place] for axis, place in zip(axes, hole, strict=True))
+        raise DiffractionError(
+            f"{shown} has a hole: no line for {lam:g} nm, theta {theta:g}°, phi {phi:g}°; "
+            "wavelengths and angles must form a regular grid"
+        )
+    _check_size(shape, powers.shape[1], shown)
+    values = np.full((*shape, powers.shape[1]), np.nan)
+    crossed = orders.shape[1] == 2
+    pairs = orders if crossed else np.insert(orders, 1, 0, axis=1)
+    grid = Lights(axes[0], axes[1], axes[2], pairs, values, crossed)
+    place = light * shape[3] + column.ravel()
+    found, counts = np.unique(place, return_counts=True)
+    if (counts > 1).any():
+        twice = int(found[counts > 1][0])
+        raise DiffractionError(
+            f"{shown}, {grid.light(twice // shape[3])}: order {grid.order(twice % shape[3])} is "
+            "listed twice"
+        )
+    values.reshape(-1, powers.shape[1])[place] = powers
+    return grid
 
 
 def _kinds(names: list[str], shown: str, what: str) -> tuple[str, ...]:
@@ -295,18 +260,6 @@ def _variable(dimensions: Any, values: Any, attributes: Any) -> Variable:
     return Variable(tuple(map(str, dimensions)), numbers * scale + offset, text)
 
 
-def _check_axes(axes: Sequence[Real], shown: str) -> None:
-    """Check the ranges of wavelengths (nm), angles (degrees) and orders, as in `AXES`."""
-    wavelengths, theta, phi, orders = axes
-    check_light(wavelengths, theta, phi, shown)
-    _check_orders(orders, shown)
-
-
-def _check_orders(orders: Real, shown: str) -> None:
-    whole = (orders == np.round(orders)) & (np.abs(orders) <= MOST_ORDER)
-    _check_all("order", orders, whole, f"a whole number of at most {MOST_ORDER}", shown)
-
-
 def check_light(wavelengths: Real, theta: Real, phi: Real, shown: str) -> None:
     """Check the ranges of wavelengths (nm) and angles (degrees).
 
@@ -327,7 +280,7 @@ def _check_all(name: str, numbers: Real, allowed: NDArray[np.bool_], hint: str, 
         raise DiffractionError(f"{shown}: {name} {numbers[~allowed][0]:g} must be {hint}")
 
 
-def _check_size(shape: tuple[int, ...], kinds: int, shown: str) -> None:
+def _check_size(shape: Sequence[int], kinds: int, shown: str) -> None:
     """Refuse grids that are too large, or empty."""
     size = np.prod(shape, dtype=float) * kinds
     if not 0 < size <= MOST_EFFICIENCIES:
@@ -337,13 +290,13 @@ def _check_size(shape: tuple[int, ...], kinds: int, shown: str) -> None:
         )
 
 
-def _check(grid: Efficiencies, shown: str) -> None:
+def _check(grid: Lights, shown: str) -> None:
     """Check the range of efficiencies."""
     wrong = ~np.isnan(grid.values) & ~((grid.values >= -ROUNDING) & (grid.values <= LARGEST_SUM))
     if wrong.any():
         *light, order, _ = np.argwhere(wrong)[0]
         where = grid.light(int(np.ravel_multi_index(light, grid.values.shape[:3])))
         raise DiffractionError(
-            f"{shown}, {where}, order {grid.orders[order]}: efficiencies must be 0 to 1, got "
+            f"{shown}, {where}, order {grid.order(order)}: efficiencies must be 0 to 1, got "
             f"{grid.values[wrong][0]:g}; they are shares of the incident light, no per cent"
         )

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Real
 from ..errors import DiffractionError, counted
 from . import cells
-from .cells import B, Counts
+from .cells import Counts
 
 #: Sum over all orders that a table may have: 1, but for a solver's error.
 LARGEST_SUM = 1.001
@@ -51,18 +51,9 @@ class Band:
         """Numbers of nodes."""
         return Counts(*self.a.shape[:3])
 
-    def kind(self, kind: int) -> NDArray[np.float32]:
-        """Return the response of a kind, `cells.A` or `cells.B`.
-
-        Raises a DiffractionError for kind B of band 0, which has no directions.
-        """
-        if kind == B and self.b is None:
-            raise DiffractionError("kind B of band 0 has no propagating order; ask for kind A")
-        return self.kinds[kind]
-
     @property
     def kinds(self) -> tuple[NDArray[np.float32], ...]:
-        """Responses of kind A and, but for band 0, of kind B."""
+        """Responses of `cells.A` and, but for band 0, of `cells.B`."""
         return (self.a,) if self.b is None else (self.a, self.b)
 
 
@@ -133,8 +124,6 @@ class ListedResponse:
         ports: all orders on the first side (above; of a block within), then all on the second one.
         The first n elements of Mueller matrices: 1 unpolarised, 3 of s and p, 16 polarised. Orders
         that do not propagate have a neighbour's.
-    in_plane : whether all light lies in the plane across the grooves: other light then has the
-        efficiencies of the light of the same K and s (`cells`), as with perfect conductors.
     index : of a clear material below a crossed grating, or None. With it, ratios of elements to
         `optics.orders.order_factor` are interpolated, of incident light about s.
     phases : (λ, θ, φ, sides, ports) float32, of polarised light: of the largest entry of each Jones
@@ -145,7 +134,6 @@ class ListedResponse:
     axes: tuple[Real, Real, Real]
     orders: NDArray[np.int64]
     values: NDArray[np.float32]
-    in_plane: bool = False
     index: float | None = None
     phases: NDArray[np.float32] | None = None
 
@@ -158,6 +146,15 @@ class ListedResponse:
     def arrays(self) -> list[NDArray[np.float32]]:
         """All numbers."""
         return [self.values] if self.phases is None else [self.values, self.phases]
+
+    @property
+    def in_plane(self) -> bool:
+        """Whether all light lies in the plane across the grooves.
+
+        Other light then has the efficiencies of the light of the same K and s (`cells`), as with
+        perfect conductors.
+        """
+        return bool(np.isin(self.axes[2], (0.0, 180.0)).all())  # φ of crossed ones passes the ends
 
     @property
     def layout(self) -> str:

@@ -18,7 +18,7 @@ from ..arrays import Real
 from ..optics.coat import face_transmittance
 from ..optics.orders import least_c
 from . import cells
-from .cells import Counts
+from .cells import Conditions, Counts
 from .response import Band, CellResponse, ListedResponse
 from .table import OrderTable
 
@@ -74,21 +74,17 @@ def middles(nodes: NDArray[Any]) -> NDArray[Any]:
 def rows(table: OrderTable, of: Kind, counts: Counts, *, coated: bool = True) -> Rows:
     """Return the unpolarised efficiencies of a kind on a grid with so many cells."""
     table = on_cells(table)
-    grid = _grid(table, of.band, counts, coated)
-    unpolarised = table.bands[of.band].kind(of.kind)[..., 0].astype(np.float64)
+    unpolarised = table.bands[of.band].kinds[of.kind][..., 0].astype(np.float64)
     values = clamped(resampled(table, of.band, unpolarised, counts, coated))
     if table.superstrate == 1.0 or not coated:
         return Rows(values, values)
-    channels = np.arange(values.shape[-1])
-    places = grid.tau[:, None, None, None], grid.rho[:, None, None]
-    lam = grid.wavelength[..., None]
-    light = cells.from_cell(of.band, of.kind, channels, *places, lam, table.optical_period)
+    light = lights(table, of, counts, coated=coated)
     through = leaving_transmittance(light.x**2 + light.y**2, table.superstrate)
     # The face keeps directions: light of channel q comes back in channel q. Its layer is too thick
     # to interfere (optics.coat), so that powers add up: (1 − E R)⁻¹ E
     most = kept(table)
     back = _TRAPPED * (1.0 - through)
-    repeated = np.eye(len(channels)) - values * back[..., None, :]
+    repeated = np.eye(of.ports) - values * back[..., None, :]
     within = np.asarray(np.linalg.solve(repeated, values), np.float64)
     root = np.sqrt(1.0 - most * (1.0 - through))
     within *= root[..., :, None] * root[..., None, :]
@@ -100,7 +96,7 @@ def kept(table: OrderTable) -> float:
     """Return ρ of `optics.coat.passage`: the largest sum of a grating's efficiencies, below 1."""
     table, most = on_cells(table), 0.0
     for of in kinds_of(table):
-        values = clamped(table.bands[of.band].kind(of.kind)[..., 0].astype(np.float64))
+        values = clamped(table.bands[of.band].kinds[of.kind][..., 0].astype(np.float64))
         most = max(most, float(values.sum(axis=-1).max()))
     return min(most, _TRAPPED)
 
@@ -111,10 +107,10 @@ def resampled(
     """Interpolate values (τ, ρ, w, …) at nodes of a band to a grid with so many cells."""
     assert isinstance(table.response, CellResponse)
     matrix = cells.linear if table.response.even else cells.interpolation
-    known, grid = table.response.bands[k].counts, _grid(table, k, counts, coated)
-    along_tau, along_rho = matrix(known.tau, grid.tau), matrix(known.rho, grid.rho)
+    known, (tau, rho, big_k, lam) = table.response.bands[k].counts, _grid(table, k, counts, coated)
+    along_tau, along_rho = matrix(known.tau, tau), matrix(known.rho, rho)
     summed = np.einsum("ta,rb,abc...->trc...", along_tau, along_rho, values, optimize=True)
-    at = cells.w_of(grid.big_k, grid.wavelength, table.wavelengths, table.optical_period)
+    at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
     along_w = matrix(known.w, at)
     return np.asarray(np.einsum("rwc,trc...->trw...", along_w, summed, optimize=True), np.float64)
 
@@ -126,19 +122,19 @@ def clamped(values: Real) -> Real:
     return np.asarray(positive / np.maximum(total, 1.0))
 
 
-class _Grid(NamedTuple):
-    """Even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), vacuum, nm."""
-
-    tau: Real
-    rho: Real
-    big_k: Real
-    wavelength: Real
-
-
-def _grid(table: OrderTable, k: int, counts: Counts, coated: bool) -> _Grid:
+def _grid(table: OrderTable, k: int, counts: Counts, coated: bool) -> tuple[Real, Real, Real, Real]:
+    """Return the even grid of a band: τ (t,), ρ (r,), K (r, 1) and wavelength (r, w), nm."""
     tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
     big_k = (k + cells.sine_squared(rho))[:, None]
-    return _Grid(tau, rho, big_k, wavelength_of(table, big_k, w, coated=coated))
+    return tau, rho, big_k, wavelength_of(table, big_k, w, coated=coated)
+
+
+def lights(table: OrderTable, of: Kind, counts: Counts, *, coated: bool) -> Conditions:
+    """Return the light (τ, ρ, w, j) of a kind's channels at the even grid of so many cells."""
+    tau, rho, _, lam = _grid(table, of.band, counts, coated)
+    places = tau[:, None, None, None], rho[:, None, None], lam[..., None]
+    channels = np.arange(of.ports // table.sides)
+    return cells.from_cell(of.band, of.kind, channels, *places, table.optical_period)
 
 
 def wavelength_of(table: OrderTable, big_k: Real, w: Real, *, coated: bool = True) -> Real:
@@ -192,17 +188,16 @@ _on_cells: weakref.WeakKeyDictionary[OrderTable, OrderTable] = weakref.WeakKeyDi
 def on_cells(table: OrderTable) -> OrderTable:
     """Return a table over cells, for readers that need all channels of a Bloch wave together.
 
-    Listed light is resampled, unpolarised, at even nodes: `CELLS_UNDER_COAT`, and it is no longer
-    exact at the listed lights. Crossed gratings have no cells.
+    Listed light is resampled, unpolarised, in `CELLS_UNDER_COAT`, and it is no longer exact at the
+    listed lights. Crossed gratings have no cells.
     """
     response = table.response
     if not isinstance(response, ListedResponse):
         return table
     if table not in _on_cells:
-        counts = Counts(*(n + 1 for n in CELLS_UNDER_COAT))
         parts: dict[int, list[NDArray[np.float32]]] = {}
         for of in kinds_of(table):
-            parts.setdefault(of.band, []).append(_sampled(table, of, counts))
+            parts.setdefault(of.band, []).append(_sampled(table, of))
         bands = tuple(Band(k, *of_band) for k, of_band in parts.items())
         _on_cells[table] = OrderTable(
             table.periods, table.wavelengths, CellResponse(bands, even=True), table.superstrate,
@@ -211,29 +206,16 @@ def on_cells(table: OrderTable) -> OrderTable:
     return _on_cells[table]
 
 
-def _sampled(table: OrderTable, of: Kind, counts: Counts) -> NDArray[np.float32]:
+def _sampled(table: OrderTable, of: Kind) -> NDArray[np.float32]:
     """Return the efficiencies (τ, ρ, w, j, q, 1) of listed light at even nodes of a kind."""
-    tau, rho, w = map(cells.even_nodes, counts)
-    big_k = (of.band + cells.sine_squared(rho))[:, None]
-    lam = cells.wavelength_of(big_k, w, table.wavelengths, table.optical_period)[..., None]
-    channels = np.arange(of.ports // table.sides)
-    light = cells.from_cell(
-        of.band, of.kind, channels, tau[:, None, None, None], rho[:, None, None], lam,
-        table.optical_period,
-    )  # fmt: skip
+    light = lights(table, of, CELLS_UNDER_COAT, coated=False)
     # just inside the horizon, where orders leave that end there
-    x, y = (part[..., None] * (1.0 - 1e-6) for part in (light.x, light.y))
-    index = table.block or 1.0
-    orders = channels[:, None] - channels
-    values = np.zeros((*counts, of.ports, of.ports))
-    size = len(channels)
-    for came in range(table.sides):
-        for left in range(table.sides):
-            side = {"from_below": (came == 1) != bool(table.block), "transmitted": came != left}
-            shares = table.efficiency(
-                index * x, index * y, light.wavelength[..., None], orders,
-                **(side if table.sides == 2 else {}),
-            )  # fmt: skip
-            rows_, columns = (slice(size * n, size * (n + 1)) for n in (came, left))
-            values[..., rows_, columns] = shares
+    x, y = (part[..., None] * ((table.block or 1.0) * (1.0 - 1e-6)) for part in light[:2])
+    channels = np.arange(light.x.shape[-1])
+    orders, sides = channels[:, None] - channels, range(table.sides)
+    values = np.block([
+        [table.efficiency(x, y, light.wavelength[..., None], orders, **table.passage(came, left))
+         for left in sides]
+        for came in sides
+    ])  # fmt: skip
     return clamped(values)[..., None].astype(np.float32)

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Real
 from ..errors import DiffractionError
-from ..optics.orders import crossed_square
 from . import cells
 from .cells import largest_band
-from .response import MUELLER, Band, CellResponse, ListedResponse, canonical
+from .response import MUELLER, Band, CellResponse, ListedResponse
 
 #: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
 WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
@@ -191,24 +190,21 @@ class OrderTable:
         grid = [[float(t), float(p)] for t in polar for p in azimuths if 0.0 <= p < 360.0]
         return list(self.header.get("directions", grid))
 
+    def passage(self, came: int, left: int) -> dict[str, bool]:
+        """Return the arguments of `efficiency` for light from one side to one side, 0 or 1."""
+        return {"from_below": (came == 1) != bool(self.block), "transmitted": came != left}
+
     def _listed_albedo(self, response: ListedResponse) -> float:
         """Return the mean over the listed lights of the sum over orders that propagate."""
-        lam, theta, phi = response.axes
-        known = np.zeros((len(theta), len(phi)), bool)
-        for t, p in self.directions:
-            steep, turned = (part[0, 0] for part in canonical([t], [p], self.crossed))
-            known[np.abs(theta - steep).argmin(), np.abs(phi - turned).argmin()] = True
-        steps = (1e-3 * lam / (period * self.superstrate) for period in self.periods)
-        shifts = [np.multiply.outer(s, m) for s, m in zip(steps, response.orders.T, strict=True)]
-        polar, azimuth = np.radians(theta)[:, None, None], np.radians(phi)[None, :, None]
-        indices = (self.block or 1.0, 1.0)[: self.sides]  # of a block the first side lies within
-        sums = []
-        for came, index in enumerate(indices):
-            mirror = (-index * np.sin(polar) * part(azimuth) for part in (np.cos, np.sin))
-            along = crossed_square(*mirror, *(shift[:, None, None] for shift in shifts)) - 1.0
-            ports = np.concatenate([along + left**2 > 0.0 for left in indices], axis=-1)
-            sums.append((response.values[:, :, :, came, :, 0] * ports).sum(axis=-1)[:, known])
-        return float(np.mean(sums))
+        theta, phi = np.radians(self.directions).T[:, :, None, None]
+        lam, sums = response.axes[0][:, None], []
+        for came in range(self.sides):
+            index = self.block if self.block and came == 0 else 1.0  # the first side lies within
+            mirror = (-index * np.sin(theta) * part(phi) for part in (np.cos, np.sin))
+            light = *mirror, lam, *response.orders.T
+            sums += [self.efficiency(*light, **self.passage(came, left)).sum(axis=-1)
+                     for left in range(self.sides)]  # fmt: skip
+        return float(np.mean(sums)) * self.sides
 
     @property
     def nbytes(self) -> int:

@@ -20,6 +20,8 @@ class TableError(NamedTuple):
         judged by a twentieth of the mean.
     relative : of an order and a polarisation, relative to its efficiency, which 95 % of them keep.
     largest, place : largest of these, and its light.
+    polarised : mean of ½‖ΔM‖ of the Mueller matrices, as a share of the light that `mean` is of
+        (½‖M‖ is the efficiency); None without them.
     """
 
     mean: float
@@ -27,13 +29,15 @@ class TableError(NamedTuple):
     relative: float
     largest: float
     place: str
+    polarised: float | None = None
 
     def facts(self) -> dict[str, Any]:
         """Return the entries of a header."""
-        return {
+        facts = {
             "error_mean": self.mean, "error_worst": self.most, "error_relative": self.relative,
             "error_largest": self.largest, "error_place": self.place,
         }  # fmt: skip
+        return facts if self.polarised is None else facts | {"error_polarised": self.polarised}
 
 
 def table_error(
@@ -49,7 +53,8 @@ def table_error(
     least : efficiency from which on the relative error counts.
     place : names a light, an order and a polarisation by their places.
     """
-    missed, light = unpolarised(found, truth, coloured)
+    missed = (np.abs(found.mean(axis=-1) - truth.mean(axis=-1)) * coloured).sum(axis=-1)
+    light = (truth.mean(axis=-1) * coloured).sum(axis=-1)
     floor = max(0.05 * float(light.mean()), 1e-12)
     relative = np.where(truth > least, np.abs(found - truth) / np.maximum(truth, least), 0.0)
     each = relative[truth > least]
@@ -61,9 +66,3 @@ def table_error(
         float(relative.max()),
         place(*map(int, worst)) if len(each) else "",
     )
-
-
-def unpolarised(found: Real, truth: Real, coloured: NDArray[np.bool_]) -> tuple[Real, Real]:
-    """Return missed and all light (lights,) of coloured orders; arguments as of `table_error`."""
-    missed = np.abs(found.mean(axis=-1) - truth.mean(axis=-1))
-    return (missed * coloured).sum(axis=-1), (truth.mean(axis=-1) * coloured).sum(axis=-1)

@@ -14,7 +14,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.heights import Source
 from mitsuba_diffraction.orders import Band, CellResponse, OrderTable
-from mitsuba_diffraction.orders.listed import Lights, listed_table
+from mitsuba_diffraction.orders.listed import Lights, listed_response
 from mitsuba_diffraction.orders.listing import list_orders
 from mitsuba_diffraction.orders.solve.films import structure_of
 from mitsuba_diffraction.orders.solve.grating_index import material_of
@@ -82,8 +82,9 @@ def with_band(table: OrderTable, number: int, change: Callable[[Any], Any]) -> O
 def one_light(periods: tuple[float, float], value: float, **options: Any) -> OrderTable:
     """A crossed grating's table of one light with orders (0, 0) and (1, 0)."""
     at = np.array([500.0]), np.zeros(1), np.zeros(1), np.array([[0, 0], [1, 0]])
-    lights = Lights(*at, np.full((1, 1, 1, 1, 1, 2, 1), value))
-    return listed_table(lights, periods, {}, **options)
+    lights = Lights(*at, np.full((1, 1, 1, 1, 1, 2, 1), value), crossed=True)
+    response = listed_response(lights, periods, 1.0)
+    return OrderTable(periods, (500.0, 500.0), response, **options)
 
 
 def saved(table: Any, name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -19,7 +18,11 @@ from ...plugin.memory import index_between, read_record, upload
 from ...plugin.sampling import invert
 from ...plugin.types import Colour, Context, Float, Index, Interaction, Vector2f
 from ..daylight import CHANNELS, ENDS, daylight_weights
-from .lobes import MIN_SUM, REACH, Below, Draw, Incidence, OrderLobe, Reflected, wavenumber_of
+from ..lookup import Order, corner_weights, weighted
+from .lobes import MIN_SUM, REACH, Below, Draw, OrderLobe, wavenumber_of
+
+#: Tangential part and cosine of ωi, in the patch's frame.
+Incidence = tuple[Vector2f, Float]
 
 
 class DaylightLobes:
@@ -40,15 +43,17 @@ class DaylightLobes:
         self._bins = len(weights.cumulative) - 1
         self._cumulative = upload(mi.Float, weights.cumulative.astype("float32"))
 
-    def reflected(self, pair: Pair, si: Interaction, below: Below, ctx: Context) -> Reflected:
+    def reflected(
+        self, pair: Pair, si: Interaction, below: Below, ctx: Context
+    ) -> tuple[Colour, Float]:
         """See `SpectralLobes.reflected`."""
         radius = dr.squared_norm(pair.uv)
-        light = Incidence(pair.incident, pair.cos_i)
+        light = pair.incident, pair.cos_i
         total = self._zeroth(light, below, radius, pair)
         others = self.others(light, below, pair.uv, radius)
         total = [a + b for a, b in zip(total, others, strict=True)]
         *colours, density = (part * pair.cos_o for part in total)
-        return Reflected(mi.Color3f(*colours), dr.detach(density))
+        return mi.Color3f(*colours), dr.detach(density)
 
     def draw(
         self, incident: Vector2f, cos_i: Float, si: Interaction, sample1: Float, sample2: Vector2f
@@ -69,10 +74,11 @@ class DaylightLobes:
         return mi.Color3f(*(self.lookup.total(row) for row in rows))
 
     def shares(
-        self, light: Incidence, below: Below, wavelength: Float, order: Any
+        self, light: Incidence, below: Below, wavelength: Float, order: Order
     ) -> tuple[Float, Float]:
         """Return the efficiency of an order, and its probability."""
-        row = self.lookup.row(*light.incident, light.cos_i, wavelength)
+        incident, cos_i = light
+        row = self.lookup.row(*incident, cos_i, wavelength)
         share, total = self.lookup.share(row, order, True, below), self.lookup.total(row)
         return share.efficiency, share.chance * dr.rcp(maximum(total, MIN_SUM))
 
@@ -86,7 +92,7 @@ class DaylightLobes:
             node = read_record(self._order_0, n, 8)
             k = wavenumber_of(node[CHANNELS])
             peak = lobe_peak(k, self.sigma)
-            value, share = self.shares(light, below, node[CHANNELS], self._window.mirrored())
+            value, share = self.shares(light, below, node[CHANNELS], mi.Vector2f(0.0))
             lobe = peak * dr.exp(-math.pi * radius * peak)
             return added(sums, node, lobe, value * horizon_correction(into, out, k), share)
 
@@ -94,91 +100,62 @@ class DaylightLobes:
         return sum_of(count, add, (light, [radius, *levels]), [mi.Float(0.0)] * CHANNELS)
 
     def others(self, light: Incidence, below: Below, uv: Vector2f, radius: Float) -> list[Float]:
-        """Sum all other orders, for red, green, blue and the density."""
-        if self._window.crossed:
-            return self._others_of_pairs(light, below, uv, radius)
-        u, v = uv.x, uv.y
-        unit = 2.0 * math.pi / self.period
-        square = maximum(radius, 1e-8)
-        # k_m = m · step, of the sign of u
-        step = wavenumber_step(u, v, self.period)
-        aside = lobe_falloff(u, v, self.sigma, self.period)
-        first = maximum(dr.ceil(self.waves[0] * dr.rcp(step)), 1.0)
-        last = minimum(
-            dr.floor(self.waves[1] * dr.rcp(step)),
-            dr.sqrt(REACH * dr.rcp(maximum(aside, 1e-8))),
-        )
-        most = int(2.0 * self.lookup.index * self.waves[1] / unit) + 1
-        lit = (last >= first) & (radius * (self.waves[1] / unit) ** 2 > 0.25)
-        count = dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, float(most))), 0)
-        row, upper_share, scale = self.smoothing(square)
-
-        def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
-            light, (step, aside, upper_share, scale) = inputs
-            m = first + mi.Float(n)
-            k = m * step
-            weights = self.weights(k, row, upper_share)
-            wavelength = 2e3 * math.pi * dr.rcp(k)
-            value, share = self.shares(light, below, wavelength, dr.mulsign(m, u))
-            lobe = scale * dr.exp(-aside * dr.square(m))
-            return added(sums, weights, lobe, value, share)
-
-        inputs = light, [step, aside, upper_share, scale]
-        return sum_of(count, add, inputs, [mi.Float(0.0)] * CHANNELS)
-
-    def _others_of_pairs(
-        self, light: Incidence, below: Below, uv: Vector2f, radius: Float
-    ) -> list[Float]:
-        """Sum the orders of a crossed grating but (0, 0), each where it is largest.
+        """Sum all orders but (0, 0), each where it is largest, for colours and the density.
 
         With q_m = 2π (m_x/d_x, m_y/d_y): k_m = q_m·(u, v)/ρ², and the lobe is smaller by
         exp(−σ² (q_m × (u, v))²/ρ²).
         """
         square = maximum(radius, 1e-8)
-        row, upper_share, scale = self.smoothing(square)
+        variance = dr.rcp(square) * (0.5 / self.sigma**2)
+        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
         units = [2.0 * math.pi / period for period in self._window.periods]
-        first, last = self.waves
+        shortest, longest = self.waves
+        if self._window.crossed:
+            count, first = mi.UInt32(self.lookup.count), mi.Float(0.0)
+        else:
+            count, first = self._reached(uv, radius)
 
         def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
-            light, (u, v, square, upper_share, scale) = inputs
-            order = mi.Vector2f(*self.lookup.order_of_port(n))
-            q_x, q_y = order.x * units[0], order.y * units[1]
+            light, (u, v, square, first, variance, scale) = inputs
+            if self._window.crossed:
+                order = self.lookup.order_of_port(n)
+            else:
+                order = dr.mulsign(first + mi.Float(n), u), mi.Float(0.0)
+            q_x, q_y = order[0] * units[0], order[1] * units[1]
             k = (q_x * u + q_y * v) * dr.rcp(square)
             aside = dr.square(self.sigma * (q_x * v - q_y * u)) * dr.rcp(square)
-            lit = (k > first) & (k < last) & (aside < REACH)
-            k = dr.select(lit, k, last)
-            weights = self.weights(k, row, upper_share)
+            lit = (k > shortest) & (k < longest) & (aside < REACH)
+            k = dr.select(lit, k, longest)
+            weights = self.weights(k, variance)
             value, share = self.shares(light, below, 2e3 * math.pi * dr.rcp(k), order)
             lobe = dr.select(lit, scale * dr.exp(-aside), 0.0)
             return added(sums, weights, lobe, value, share)
 
-        inputs = light, [uv.x, uv.y, square, upper_share, scale]
-        return sum_of(self.lookup.count, add, inputs, [mi.Float(0.0)] * CHANNELS)
+        inputs = light, [uv.x, uv.y, square, first, variance, scale]
+        return sum_of(count, add, inputs, [mi.Float(0.0)] * CHANNELS)
 
-    def smoothing(self, square: Float) -> tuple[Index, Float, Float]:
-        """Return the row of `weights`, place in it, and scale of lobes, for u² + v²."""
-        variance = dr.rcp(square) * (0.5 / self.sigma**2)
-        place = (variance - self._variances[0]) * (
-            self._counts[0] / (self._variances[1] - self._variances[0])
+    def _reached(self, uv: Vector2f, radius: Float) -> tuple[Index, Float]:
+        """Return the number of orders of grooves that have light, and the first one's |m|."""
+        # k_m = m · step, of the sign of u
+        step = wavenumber_step(uv.x, uv.y, self.period)
+        aside = lobe_falloff(uv.x, uv.y, self.sigma, self.period)
+        first = maximum(dr.ceil(self.waves[0] * dr.rcp(step)), 1.0)
+        last = minimum(
+            dr.floor(self.waves[1] * dr.rcp(step)),
+            dr.sqrt(REACH * dr.rcp(maximum(aside, 1e-8))),
         )
-        lower = index_between(dr.floor(place), 0.0, self._counts[0] - 1.0)
-        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
-        return index_of(lower), clip(place - lower, 0.0, 1.0), scale
+        per_order = self.waves[1] * self.period / (2.0 * math.pi)
+        most = float(int(2.0 * self.lookup.index * per_order) + 1)
+        lit = (last >= first) & (radius * per_order**2 > 0.25)
+        return dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, most)), 0), first
 
-    def weights(self, k: Float, row: Index, share: Float) -> list[Float]:
+    def weights(self, k: Float, variance: Float) -> list[Float]:
         """Interpolate the smoothed weights of a wavenumber."""
-        place = (k - self.waves[0]) * (self._counts[1] / (self.waves[1] - self.waves[0]))
-        lower = index_between(dr.floor(place), 0.0, self._counts[1] - 1.0)
-        t = clip(place - lower, 0.0, 1.0)
-        values = read_record(self._smoothed, row * self._counts[1] + index_of(lower), 4 * CHANNELS)
-        return [
-            dr.lerp(
-                dr.lerp(values[c], values[CHANNELS + c], t),
-                dr.lerp(values[2 * CHANNELS + c], values[3 * CHANNELS + c], t),
-                share,
-            )
-            for c in range(CHANNELS)
-        ]
+        ends = zip((variance, k), (self._variances, self.waves), strict=True)
+        places = [clip((x - low) * (1.0 / (high - low)), 0.0, 1.0) for x, (low, high) in ends]
+        cell, shares = corner_weights(places, self._counts, 1.0)
+        values = read_record(self._smoothed, cell, 4 * CHANNELS)
+        return [weighted(shares, values[c::CHANNELS]) for c in range(CHANNELS)]
 
 
 def added(

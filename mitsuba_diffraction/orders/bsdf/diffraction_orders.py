@@ -158,17 +158,16 @@ class DiffractionOrders(SurfaceBSDF):
     ) -> tuple[Spectrum, Float]:
         """See `SurfaceBSDF.diffracted`; of two sides, those of the requested components."""
         if not self.transmits:
-            light = self._lobes.reflected(Pair(site.si, wo, site.frame, active), site.si, None, ctx)
-            return light.value, light.density
+            return self._lobes.reflected(Pair(site.si, wo, site.frame, active), site.si, None, ctx)
         cos_i, cos_o = mi.Frame3f.cos_theta(site.si.wi), mi.Frame3f.cos_theta(wo)
         lit = active & (cos_i * cos_o != 0.0) & requested(ctx, cos_i * cos_o < 0.0)
         came, left = self._index(cos_i > 0.0), self._index(cos_o > 0.0)
         pair = Passage(site, wo, lit, (came, left), self._first_side)
-        light = self._lobes.reflected(pair, site.si, self._first_side * cos_o < 0.0, ctx)
-        value = light.value
+        below = self._first_side * cos_o < 0.0
+        value, density = self._lobes.reflected(pair, site.si, below, ctx)
         if self.table.block and ctx.mode == mi.TransportMode.Radiance:
             value = value * dr.square(came / left)  # radiance over n² is transmitted
-        return dr.select(lit, value, 0.0), dr.select(lit, light.density, 0.0)
+        return dr.select(lit, value, 0.0), dr.select(lit, density, 0.0)
 
     @property
     def _first_side(self) -> float:

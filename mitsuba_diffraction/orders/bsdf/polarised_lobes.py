@@ -13,11 +13,11 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ...optics.boundary import SAME_DIRECTION, Jones
+from ...optics.boundary import Jones
 from ...optics.coat import refracted, transmittances
 from ...optics.fresnel import amplitudes
 from ...plugin.arithmetic import maximum, minimum
-from ...plugin.boundary import mueller, turn, turned
+from ...plugin.boundary import mueller, polarisation_axes, turn, turned
 from ...plugin.directions import Pair
 from ...plugin.types import Context, Float, Spectrum, Vector3f
 from ..polarised import nearest_jones
@@ -46,7 +46,7 @@ class PolarisedLobes(SpectralLobes):
                 if self.lookup.coated:
                     within = self.lookup.repeated(light.row, order, active & light.row.lit)
                     share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
-                    face = dr.select(order == 0.0, light.row.face, 0.0)
+                    face = dr.select(order.x == 0.0, light.row.face, 0.0)
                 power = maximum(efficiency - face, 0.0) * lobe * share
                 faces[n] = dr.fma(face, lobe, faces[n])
                 left[n] -= power
@@ -84,7 +84,7 @@ class _Path:
         inverse = dr.rsqrt(maximum(0.5 * (dr.square(r_s) + dr.square(r_p)), _MIN_DIVISOR))
         roots = [dr.sqrt(power) * inverse for power in powers]
         zero = mi.Float(0.0)
-        s = _level(self._ends[0])
+        s, _ = polarisation_axes(*self._ends)
         matrices = [(r_s * root, zero, zero, r_p * root) for root in roots]
         return self._mueller(matrices, (s, _across(s, self._ends[1])))
 
@@ -106,7 +106,7 @@ class _Path:
         powers = transmittances(dr.abs(outside.z), mi.Float(self._index))
         inverse = dr.rcp(maximum(0.5 * (powers[0] + powers[1]), _MIN_DIVISOR))
         through_s, through_p = (dr.sqrt(power * inverse) for power in powers)
-        s, zero = _level(outside), mi.Float(0.0)
+        s, zero = polarisation_axes(outside, outside)[0], mi.Float(0.0)
         first, last = (outside, inside) if enters else (inside, outside)
         return turned(
             (through_s, zero, zero, through_p),
@@ -119,14 +119,6 @@ def _across(axis: Vector3f, direction: Vector3f) -> Vector3f:
     """Return a unit vector, made perpendicular to a direction."""
     across = dr.fma(direction, -dr.dot(axis, direction), axis)
     return across * dr.rsqrt(maximum(dr.squared_norm(across), _MIN_DIVISOR))
-
-
-def _level(direction: Vector3f) -> Vector3f:
-    """Return s = ẑ×d/|ẑ×d|, y along the normal."""
-    square = dr.square(direction.x) + dr.square(direction.y)
-    inverse = dr.rsqrt(maximum(square, SAME_DIRECTION))
-    level = mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)
-    return dr.select(square > SAME_DIRECTION, level, mi.Vector3f(0.0, 1.0, 0.0))
 
 
 def _product(a: Jones, b: Jones) -> Jones:

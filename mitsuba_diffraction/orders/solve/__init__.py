@@ -15,8 +15,7 @@ integral    solver: boundary integral method
 chandezon   solver: coordinates that follow slopes
 coupled     solver: coupled waves, for dielectrics
 resolution  choice of the solver's resolution, by convergence
-nodes       stations at nodes, and along lines across a band
-node_counts  numbers of nodes, by series along lines
+nodes       stations at the nodes of bands, and of single lights
 sheet       the sum of reflections in a thin sheet with a flat lower side
 jobs        stations solved in processes, and stored until the table is written
 recipes     recipes with `method = "solved"`

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...arrays import Complex, Real
 from ...errors import warn
-from ..polarised import mueller_of, turned_axes
-from ..response import UNPOLARISED, CellResponse
+from ..efficiency import shares_along
+from ..polarised import mueller_of
+from ..response import MUELLER, UNPOLARISED
 from ..table import OrderTable
-from ..table_error import TableError, table_error, unpolarised
+from ..table_error import TableError, table_error
 from .jobs import Jobs, Problem
-from .nodes import Place, located
+from .nodes import located
 
 #: The error that 95 % of directions and wavelengths keep, in tolerances.
 WORST = 4.0
@@ -24,51 +25,28 @@ SAMPLES = 128
 _COUNTED = 1e-4
 
 
-class InterpolationError(NamedTuple):
-    """Error of interpolation, over random directions and wavelengths.
-
-    table : of all orders but 0; relative errors are of orders above 1e-4 of the light.
-    bands : of each band, from k = 0, as a share of all light.
-    polarised : mean of ½‖ΔM‖ of the Mueller matrices, as a share of the same light (½‖M‖ is the
-        efficiency); None without them.
-    """
-
-    table: TableError
-    bands: Real
-    polarised: float | None
-
-    @property
-    def mean(self) -> float:
-        """Larger one of the mean errors, of efficiencies and of matrices."""
-        return max(self.table.mean, self.polarised or 0.0)
-
-    def facts(self) -> dict[str, Any]:
-        """Return the entries of a header."""
-        polarised = {} if self.polarised is None else {"error_polarised": self.polarised}
-        return self.table.facts() | polarised
-
-
-def missed_tolerance(header: Mapping[str, Any]) -> bool:
-    """Whether a table misses its tolerance, by the measured errors in its header."""
+def missed_tolerance(header: Mapping[str, Any], part: float = 1.0) -> bool:
+    """Whether a table misses part of its tolerance, by the measured errors in its header."""
     if "tolerance" not in header or "error_mean" not in header:
         return False
     mean = max(header["error_mean"], header.get("error_polarised", 0.0))
-    tolerance = header["tolerance"]
+    tolerance = part * header["tolerance"]
     return bool(mean > tolerance or header["error_worst"] > WORST * tolerance)
 
 
-def warn_of_error(header: Mapping[str, Any]) -> None:
-    """Warn of a table that misses its tolerance."""
+def warn_of_error(header: Mapping[str, Any], hint: str = "") -> None:
+    """Warn of a table that misses its tolerance; hint : on its layers."""
     if missed_tolerance(header):
         tolerance = header["tolerance"]
         warn(
             f"the table misses {header['error_mean']:.2%} of the light in its orders on average "
             f"(tolerance {tolerance:.2%}) and {header['error_worst']:.2%} in 5 % of directions "
             f"(tolerance {WORST * tolerance:.2%}); use a larger tolerance, or fewer wavelengths"
+            + hint
         )
 
 
-def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> InterpolationError:
+def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> TableError:
     """Compare a table, as the renderer reads it, with solutions at random lights.
 
     Directions are sampled as in diffuse light within the superstrate, or a block, wavelengths
@@ -87,9 +65,9 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Interpola
         count = len(orders)
         side = n % table.sides * int(not (table.block and guided[n]))
         at = index * x[n], index * y[n], lam[n], *orders.T
-        below, ports = (side == 1) != bool(table.block), slice(count * table.sides)
+        ports = slice(count * table.sides)
         truth[n, ports], found[n, ports] = by_polarisation(
-            table, solved[place], at, side * count + port, below
+            table, solved[place], at, side * count + port, side
         )
         alone = np.arange(table.sides) != (side if table.block else -1)
         lit = np.tile(orders.any(axis=1), table.sides) if count > 1 else alone
@@ -104,38 +82,21 @@ def measured_error(table: OrderTable, problem: Problem, jobs: Jobs) -> Interpola
         order = f"({m_x}, {m_y})" if table.crossed else f"{m_x}"
         return f"{lam[n]:.1f} nm, x {x[n]:.3f}, y {y[n]:.3f}, order {order}"
 
-    missed, light = unpolarised(found, truth, coloured)
-    bands = [light.place.band if isinstance(light.place, Place) else 0 for light in lights]
-    return InterpolationError(
-        table_error(found, truth, coloured, _COUNTED, name),
-        np.bincount(bands, missed, table.last_band + 1) / light.sum(),
-        float(turned / light.sum()) if table.polarised else None,
-    )
+    error = table_error(found, truth, coloured, _COUNTED, name)
+    light = (truth.mean(axis=-1) * coloured).sum()
+    return error._replace(polarised=float(turned / light)) if table.polarised else error
 
 
 def by_polarisation(
-    table: OrderTable, amplitudes: Complex, at: tuple[Any, ...], port: int, below: bool
+    table: OrderTable, amplitudes: Complex, at: tuple[Any, ...], port: int, came: int
 ) -> tuple[Real, Real]:
     """Return solved and tabulated efficiencies of all ports, (ports, 1 or 2).
 
-    Of light of each polarisation along the grooves; of s and of p in tables of a list.
+    Of light of each polarisation along the grooves; came : side that it comes from, 0 or 1.
     """
-
-    def of_sides(lookup: Any) -> Real:
-        return np.concatenate([
-            lookup(*at, from_below=below, transmitted=bool(other) != (below != bool(table.block)))
-            for other in range(table.sides)
-        ])  # fmt: skip
-
-    truth = powers(amplitudes)[0, port]
-    if table.response.elements == UNPOLARISED:
-        return truth.mean(axis=-1, keepdims=True), of_sides(table.efficiency)[:, None]
-    if isinstance(table.response, CellResponse):
-        return truth, of_sides(table.groove_efficiency)
-    turned = turned_axes(at[0], at[1])
-    mean, cosine, sine = mueller_of(amplitudes)[0, port].reshape(-1, 16)[:, :3].T
-    half = cosine * turned.cosine + sine * turned.sine
-    return np.stack([mean + half, mean - half], axis=-1), of_sides(table.polarised_efficiency)
+    shares = [shares_along(table, *at, **table.passage(came, left)) for left in range(table.sides)]
+    truth, found = powers(amplitudes)[0, port], np.concatenate(shares)
+    return (truth if found.shape[-1] > 1 else truth.mean(axis=-1, keepdims=True)), found
 
 
 def diffuse_light(count: int, wavelengths: tuple[float, float]) -> tuple[Real, Real, Real]:
@@ -149,3 +110,13 @@ def diffuse_light(count: int, wavelengths: tuple[float, float]) -> tuple[Real, R
 def powers(amplitudes: Complex) -> Real:
     """Return (w, j, q, 2) of (w, j, 2, q, 2): sums over the leaving light's polarisations."""
     return np.asarray((np.abs(amplitudes) ** 2).sum(axis=-1).swapaxes(2, 3))
+
+
+def limited(count: int, amplitudes: Complex) -> Real:
+    """Return the first elements of the Mueller matrices of amplitudes, (w, j, q, count).
+
+    Amplitudes are scaled where their powers sum to more than 1.
+    """
+    total = powers(amplitudes).sum(axis=2)
+    matrices = mueller_of(amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None])
+    return matrices.reshape(*matrices.shape[:-2], MUELLER)[..., :count]

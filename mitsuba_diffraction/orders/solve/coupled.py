@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -370,14 +370,10 @@ def _slices(
     slices: Sequence[Slice], first: int, period: float
 ) -> list[tuple[float, list[_Filled]]]:
     """Return slices from the top: thickness, and parts; first : number of their first medium."""
-    layers = []
+    number, layers = count(first), []
     for thickness, parts in slices:
-        filled = [
-            _Filled(np.array([[part.begin, part.end]]) / period, number, _ABOVE)
-            for number, part in enumerate(parts, first)
-        ]
-        layers.append((thickness, filled))
-        first += len(parts)
+        ends = np.array([part[1:] for part in parts]).reshape(-1, 1, 2) / period
+        layers.append((thickness, [_Filled(each, next(number), _ABOVE) for each in ends]))
     return layers[::-1]
 
 

@@ -9,29 +9,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arrays import Complex, Real
+from ...arrays import Real
 from ...errors import DiffractionError, warn
-from ..listed import Lights, listed_table, mirror_of, warn_of_gaps
+from ..listed import Lights, listed_response, mirror_of, warn_of_gaps
 from ..lists import check_light
-from ..polarised import ODD, mueller_of
-from ..response import LINEAR, MUELLER, ListedResponse, orders_between
+from ..polarised import ODD
+from ..response import LINEAR, MUELLER, orders_between
 from ..table import OrderTable, check_outline
-from .accuracy import measured_error, powers, warn_of_error
+from .accuracy import limited, measured_error, warn_of_error
 from .crossed import folded
 from .jobs import Jobs, Problem
 from .nodes import AnyPlace, located
-from .resolution import resolved
+from .resolution import STEP, coarsest, resolved
 from .settings import (
-    MOST_EXCESS,
     Settings,
-    announce_comparison,
     announce_stage,
     header_of,
+    solved_stage,
 )
 from .stations import LEAST_COSINE, Grating
 
@@ -39,37 +38,27 @@ from .stations import LEAST_COSINE, Grating
 _COMPARED, _MOST = 5, 100_000
 
 
-class Directions(NamedTuple):
-    """Directions to the light, degrees, a grid of θ and φ; step between wavelengths, nm.
-
-    is_all : whether they stand for all light, so that the error between them is measured.
-    """
-
-    theta: ArrayLike
-    phi: ArrayLike = 0.0
-    step: float = 5.0
-    is_all: bool = False
-
-
 def solve_directions(
-    problem: Problem, lights: Directions, how: Settings, work: Jobs, facts: Mapping[str, Any]
-) -> OrderTable:
+    problem: Problem, directions: tuple[ArrayLike, ArrayLike], step: float, how: Settings,
+    work: Jobs, facts: Mapping[str, Any], *, is_all: bool = False,
+) -> OrderTable:  # fmt: skip
     """Solve the orders of light from some directions, on all sides of the grating.
 
     Raises a DiffractionError if the directions are out of their range, too many lights are asked
-    for, or efficiencies sum to more than a coarse solution may.
+    for, or efficiencies sum to more than a coarse solution may at higher resolutions, too.
 
+    directions : θ and φ to the light, degrees, of which a grid is made.
+    step : between wavelengths, nm.
     facts : entries of the header.
+    is_all : whether the directions stand for all light, so that the error between them is measured.
     """
     grating, (low, high) = problem.grating, how.wavelengths
-    block = grating.superstrate if grating.block else None
-    superstrate = 1.0 if block else grating.superstrate
-    periods = grating.periods
-    check_outline(periods, how.wavelengths, superstrate, grating.thin, block, listed=True)
-    count = max(int(np.ceil((high - low) / lights.step - 1e-9)), 1) + 1 if high > low else 1
+    superstrate, thin, block = grating.media
+    check_outline(grating.periods, how.wavelengths, *grating.media, listed=True)
+    count = max(int(np.ceil((high - low) / step - 1e-9)), 1) + 1 if high > low else 1
     lam = np.linspace(low, high, count)
     _warn_of_fringes(grating, lam)
-    polar, azimuth = (np.unique(np.asarray(angle, np.float64)) for angle in lights[:2])
+    polar, azimuth = (np.unique(np.asarray(angle, np.float64)) for angle in directions)
     check_light(lam, polar, azimuth, "solve_orders")
     shape = lam.size, polar.size, azimuth.size
     if np.prod(shape) * grating.sides > _MOST:
@@ -99,7 +88,9 @@ def solve_directions(
     for came, of_side in enumerate(found):
         for light in of_side:
             ports[light.place].append(came * len(light.orders) + light.port)
-    announce_comparison(problem, work, compared)
+    coarse = replace(problem, resolution=problem.resolution or coarsest(problem))
+    # a solution costs as its matrices: the cube of the resolution
+    announce_stage("choosing the resolution", coarse, work, compared, cost=1.0 + STEP**3)
     chosen = resolved(problem, work, compared, how.tolerance / 2, ports)
     ends = np.concatenate([light.orders for of_side in found for light in of_side])
     first, last = ends.min(axis=0), ends.max(axis=0)
@@ -111,36 +102,37 @@ def solve_directions(
         elements = 1  # without phases, which tell s from p
     values = np.full((len(waves), grating.sides, grating.sides, len(orders), elements), np.nan)
     jones = np.full((*values.shape[:-1], 4), np.nan, np.complex128) if how.polarised else None
-    announce_stage("solving", chosen.problem, work, every, 4.0 * values.size)
-    solved = work.amplitudes(chosen.problem, every, "solving orders")
+    problem, solved = solved_stage(chosen.problem, work, every, 4.0 * values.size, ports)
+    chosen = chosen._replace(problem=problem)
     for came, of_side in enumerate(found):
         for n, light in enumerate(of_side):
-            size, step = len(light.orders), steps[number[n]]
-            rows = _elements(solved[light.place], came * size + light.port, elements, grating.thin)
-            rows = rows * np.where(ODD.ravel()[:elements], step.prod(), 1)
-            places = (light.orders * step - first) @ [1, int(last[0] - first[0]) + 1]
+            size, sign = len(light.orders), steps[number[n]]
+            rows = limited(elements, solved[light.place])[0, came * size + light.port]
+            rows *= np.where(ODD.ravel()[:elements], 0 if grating.thin else sign.prod(), 1)
+            places = (light.orders * sign - first) @ [1, int(last[0] - first[0]) + 1]
             for left in range(grating.sides):
                 values[n, came, left, places] = rows[left * size : (left + 1) * size]
             if jones is not None:  # no sheet or block
                 matrices = solved[light.place][0, light.port].transpose(1, 2, 0).reshape(size, 4)
                 phase = np.exp(2j * np.pi * (light.orders @ turns[number[n]]))
-                odd = np.array([1, step.prod(), step.prod(), 1])
+                odd = np.array([1, sign.prod(), sign.prod(), 1])
                 jones[n, 0, 0, places] = matrices * odd * phase[:, None]
     header = header_of(chosen, how) | dict(facts)
-    if not lights.is_all:
+    if not is_all:
         header["directions"] = [[float(t), float(p)] for t in polar for p in azimuth]
     matrices = None if jones is None else jones.reshape(*shape, *jones.shape[1:])
-    table = Lights(lam, polar, azimuth, orders, values.reshape(*shape, *values.shape[1:]), matrices)
-    made = listed_table(
-        table, periods, header, superstrate=superstrate, thin=grating.thin, block=block,
-    )  # fmt: skip
-    if lights.is_all:
+    crossed = grating.cell is not None
+    numbers = values.reshape(*shape, *values.shape[1:])
+    grid = Lights(lam, polar, azimuth, orders, numbers, crossed, matrices)
+    response = listed_response(grid, grating.periods, superstrate, block)
+    if is_all:
         # index of a clear material in the middle of its wavelengths
         middle = grating.material.index(0.5 * sum(grating.wavelengths))
-        assert isinstance(made.response, ListedResponse)
         assert middle is not None  # `crossed.check_cell`
         clear = None if middle.imag or middle.real <= 1.0 else float(middle.real)
-        made = replace(made, response=replace(made.response, index=clear))
+        response = replace(response, index=clear)
+    made = OrderTable(grating.periods, how.wavelengths, response, superstrate, header, thin, block)
+    if is_all:
         header |= measured_error(made, chosen.problem, work).facts()
         warn_of_error(header)
     warn_of_gaps(made, f"the table of {grating.profile.name}")
@@ -165,25 +157,3 @@ def _nearest_grazing(grating: Grating, x: Real, y: Real, waves: Real) -> int:
     most = int(2.0 / steps.min()) + 1
     leaves = x + np.arange(-most, most + 1)[:, None] * steps
     return int(np.abs(1.0 - leaves**2 - y**2).min(axis=0).argmin())
-
-
-def _elements(amplitudes: Complex, port: int, count: int, thin: bool) -> Real:
-    """Return the first elements (q, n) of the matrices from a port, scaled to sums of 1 at most.
-
-    thin : whether amplitudes are roots of efficiencies, without phases.
-
-    Raises a DiffractionError if they sum to more than a coarse solution may.
-    """
-    if thin:
-        along = powers(amplitudes)[0, port]
-        rows = np.stack([along.mean(axis=-1), 0.5 * (along[:, 0] - along[:, 1]), 0.0 * along[:, 0]],
-                        axis=-1)[:, :count]  # fmt: skip
-    else:
-        rows = mueller_of(amplitudes)[0, port].reshape(-1, MUELLER)[:, :count]
-    total = float(rows[:, 0].sum())
-    if total > MOST_EXCESS:
-        raise DiffractionError(
-            f"efficiencies of a solution sum to {total:.4g}; use a higher resolution, or another "
-            "method"
-        )
-    return np.asarray(rows / max(total, 1.0))

@@ -77,15 +77,6 @@ class Structure:
         substrate = () if self.substrate is None else (self.substrate,)
         return (*(film.material for film in self.films), *parts, *substrate)
 
-    @property
-    def lengths(self) -> tuple[float, ...]:
-        """All lengths, µm, which with the materials identify the structure."""
-        lengths: list[float] = [len(self.films), *(film.thickness for film in self.films)]
-        for thickness, parts in self.slices:
-            lengths += [thickness, len(parts)]
-            lengths += [end for part in parts for end in (part.begin, part.end)]
-        return tuple(lengths)
-
     def fringes(self, wavelength: float) -> tuple[float, str]:
         """Return the distance of fringes of the layers, nm, infinite without, and a line on it.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import signal
 import threading
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Complex, Real
 from ...atomic import make_folder
+from ...digests import key_of
 from ...errors import DiffractionError, check_choice, one_line
 from ...progress import Progress, silent
 from ...system import environment
@@ -28,6 +28,7 @@ from ...tables.store import Record, found, write_record
 from .chandezon import Chandezon, refused
 from .coupled import CoupledWaves
 from .crossed import CrossedWaves
+from .grating_index import TabulatedIndex
 from .integral import IntegralSolver
 from .nodes import AnyPlace, CrossedPlace
 from .sheet import sheet_efficiencies
@@ -108,7 +109,7 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
     if (cell := grating.cell) is not None:
         check_choice("method", method, (AUTO, "coupled"))
         outline: tuple[object, ...] = CROSSED, cell.periods, grating.wavelengths
-        digest = digest_of(outline, cell.heights, material.wavelengths, material.values)
+        digest = key_of(outline, cell.heights.tolist(), _numbers(material))
         return Problem(grating, CROSSED, resolution, digest)
     if method == AUTO:
         method = method_for(grating)
@@ -121,22 +122,19 @@ def problem_of(grating: Grating, method: str, resolution: int) -> Problem:
         )
     outline = "amplitudes", method, grating.superstrate, grating.wavelengths, grating.thin
     profile = grating.line
-    digest = digest_of(
-        outline + (("block",) if grating.block else ()),
-        profile.period, profile.x, profile.z, material.wavelengths, material.values,
-        structure.lengths,
-        *(part for medium in structure.materials for part in (medium.wavelengths, medium.values)),
+    digest = key_of(
+        outline, grating.block, profile.period, profile.x.tolist(), profile.z.tolist(),
+        [film.thickness for film in structure.films],
+        [(each.thickness, [part[1:] for part in each.parts]) for each in structure.slices],
+        [_numbers(medium) for medium in (material, *structure.materials)],
     )  # fmt: skip
     return Problem(grating, method, resolution, digest, LEAST_COSINES.get(method, LEAST_COSINE))
 
 
-def digest_of(*parts: object) -> str:
-    """Return the SHA-256 of the numbers of arrays, and of the texts of other parts."""
-    content = hashlib.sha256()
-    for part in parts:
-        is_array = isinstance(part, np.ndarray)
-        content.update(np.ascontiguousarray(part).tobytes() if is_array else repr(part).encode())
-    return content.hexdigest()
+def _numbers(material: TabulatedIndex) -> list[Any]:
+    """Return the wavelengths and indices of a material, as a key has them."""
+    values = [] if material.values is None else material.values.view(np.float64).tolist()
+    return [material.wavelengths.tolist(), values]
 
 
 @lru_cache(maxsize=2)
@@ -291,22 +289,11 @@ class Jobs:
         """Processor seconds of all solutions so far, including solutions read from the folder."""
         return sum(solved.seconds for solved in self._known.values())
 
-    def seconds(self, problem: Problem, place: AnyPlace) -> float:
-        """Return the processor seconds that a place takes."""
-        ((_, seconds),) = self.calls(partial(timed, problem), [place])
-        return float(seconds)
-
 
 def _names(problem: Problem, places: Iterable[Spot]) -> dict[Spot, str]:
     """Return the names of the solutions of places."""
     outline = problem.digest, problem.resolution, problem.least_cosine
-    return {place: digest_of((*outline, tuple(place)))[:24] for place in places}
-
-
-def timed(problem: Problem, place: AnyPlace) -> float:
-    """Return the processor seconds that a place takes, without the start of the solver."""
-    solver_of(problem)
-    return solve_place(problem, place).seconds
+    return {place: key_of(*outline, place)[:24] for place in places}
 
 
 @contextmanager

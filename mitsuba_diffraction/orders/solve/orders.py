@@ -9,23 +9,29 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.fft import dct
 
 from ...arrays import Complex, Real
 from ...errors import DiffractionError, check_choice, quoted
 from ...heights import HeightField
 from .. import cells
 from ..cells import Counts
-from ..polarised import mueller_of
 from ..response import ALONG, MOST_NODES, MUELLER, UNPOLARISED, Band, CellResponse
 from ..table import LEAST_BLOCK, OrderTable, check_outline
-from .accuracy import WORST, measured_error, missed_tolerance, powers, warn_of_error
+from .accuracy import (
+    diffuse_light,
+    limited,
+    measured_error,
+    missed_tolerance,
+    powers,
+    warn_of_error,
+)
 from .crossed import PHI, THETA, check_cell
-from .directions import Directions, solve_directions
+from .directions import solve_directions
 from .films import Layers, Substance, structure_of
 from .grating_index import TabulatedIndex, material_of
 from .jobs import AUTO, Jobs, Problem, problem_of, solver_of
-from .node_counts import node_counts
 from .nodes import (
     Place,
     at_nodes,
@@ -34,24 +40,24 @@ from .nodes import (
 )
 from .profiles import Profile, UnitCell
 from .resolution import (
-    coarsest,
     energy_error,
-    finer_problem,
     places_to_test,
     reciprocity_error,
     resolved,
 )
-from .settings import MOST_EXCESS, Estimate, Settings, announce_stage, header_of
+from .settings import Estimate, Settings, header_of, solved_stage
 from .stations import Grating
 
 #: Times that a table which misses its tolerance gets more nodes, and their factor.
-REFINEMENTS, _FINER = 2, 1.4
-#: Part of a band's error that more nodes remove, at least.
-_GAINED = 0.5
-#: Times that the resolution is raised, if solutions at nodes have light from nothing.
-_RAISED = 3
-#: Nodes of a block's first table; each refinement halves the distance between them.
-BLOCK_COUNTS = Counts(9, 7, 3)
+REFINEMENTS, _FINER = 8, 1.4
+#: Part of the tolerance that Chebyshev nodes keep: some light misses more than random light says.
+_AIMED = 0.5
+#: Part of the tolerance in the last terms of series, up to which more nodes gain nothing.
+_WORTH = 0.25
+#: Part of the error, by the last terms of series along all axes, that a refinement has less of.
+_GAINED = 0.8
+#: Nodes of a first table; of a block each refinement halves the distance between them.
+COUNTS, BLOCK_COUNTS = Counts(4, 3, 2), Counts(9, 7, 3)
 #: Bytes of a refined table at most.
 MOST_BYTES = 128 << 20
 
@@ -75,8 +81,8 @@ def solve_orders(
 ) -> OrderTable:
     """Solve the orders of a grating, for all directions and wavelengths or for listed directions.
 
-    A table that misses its tolerance is refined up to twice, then returned with a warning; its
-    header has the measured error.
+    A table gets more nodes until it keeps half of its tolerance, at most `REFINEMENTS` times. A
+    table that misses its tolerance then is returned with a warning; the header has the error.
 
     Raises a DiffractionError if an argument is out of its range, or the solver is not installed or
     does not converge.
@@ -125,9 +131,9 @@ def solve_orders(
         problem = problem_of(
             Grating(cell, substance, 1.0, how.wavelengths), how.method, how.resolution or 0
         )
-        every = Directions(THETA, PHI, step or 20.0, is_all=True)
-        lights = every if theta is None else Directions(theta, phi, step or 5.0)
-        return solve_directions(problem, lights, how, work, {})
+        if theta is None:
+            return solve_directions(problem, (THETA, PHI), step or 20.0, how, work, {}, is_all=True)
+        return solve_directions(problem, (theta, phi), step or 5.0, how, work, {})
     if thin or block:
         index = substance.index(how.wavelengths)
         if index is None or index.imag.any() or index.real.min() < LEAST_BLOCK:
@@ -162,17 +168,9 @@ def solve_orders(
     problem = problem_of(grating, "coupled" if block else how.method, how.resolution or 0)
     facts = {"material": substance.name} if block else {}
     if theta is not None:
-        lights = Directions(theta, phi, step or 5.0)
-        return solve_directions(problem, lights, how, work, facts)
-    check_outline((profile.period, math.inf), how.wavelengths, *_media(grating))
+        return solve_directions(problem, (theta, phi), step or 5.0, how, work, facts)
+    check_outline((profile.period, math.inf), how.wavelengths, *grating.media)
     return _solve_cells(problem, how, work, facts)
-
-
-def _media(grating: Grating) -> tuple[float, bool, float | None]:
-    """Return superstrate, thin and block of a grating's table."""
-    if grating.block:
-        return 1.0, False, grating.superstrate
-    return grating.superstrate, grating.thin, None
 
 
 def _solve_cells(
@@ -182,21 +180,17 @@ def _solve_cells(
     grating = problem.grating
     bands = range(cells.largest_band(how.wavelengths, grating.optical_period) + 1)
     chosen = resolved(problem, work, places_to_test(bands), how.tolerance / 2)
-    coarse = problem = chosen.problem
-    if how.resolution is None and problem.method == "integral":  # others cost about the same
-        coarse = replace(problem, resolution=coarsest(problem))
-    if grating.block:
-        counts = dict.fromkeys(bands, BLOCK_COUNTS)
-    else:
-        counts = node_counts(coarse, work, bands, how)
+    problem, first = chosen.problem, BLOCK_COUNTS if grating.block else COUNTS
+    counts = dict.fromkeys(bands, first._replace(w=1) if grating.is_perfect else first)
     header = header_of(chosen, how) | dict(facts)
-    superstrate, thin, block = _media(grating)
+    superstrate, thin, block = grating.media
     elements = MUELLER if how.polarised else UNPOLARISED if block else ALONG
-    values_of = _lossless if grating.block else partial(_limited, elements)
+    values_of = _lossless if grating.block else partial(limited, elements)
     # light that is its own reverse, see `resolution`
     itself = [Place(k, kind, 0.5, 0.41, (0.5,)) for k in bands for kind in kinds_of(k)]
     for refinement in range(REFINEMENTS + 1):
-        problem, solved = _solved_at_nodes(problem, counts, work, elements)
+        every = [place for k in bands for place in places_of(k, counts[k], _nodes(grating))]
+        problem, solved = solved_stage(problem, work, every, _size(grating, counts, elements))
         header |= {
             "solver": solver_of(problem).name,
             "reciprocity_error": reciprocity_error(
@@ -217,38 +211,19 @@ def _solve_cells(
             grating.periods, how.wavelengths,
             CellResponse(tuple(made), even=bool(block)), superstrate, header, thin, block,
         )  # fmt: skip
-        error = measured_error(table, problem, work)
-        header |= error.facts()
-        if not missed_tolerance(header) or refinement == REFINEMENTS:
+        header |= measured_error(table, problem, work).facts()
+        missed = missed_tolerance(header, 1.0 if block else _AIMED)
+        if not missed or refinement == REFINEMENTS:
             break
-        excess = max(error.mean, error.table.most / WORST) / how.tolerance
-        finer = _refined_counts(counts, error.bands, excess, grating.block)
-        if _size(grating, finer, elements) > MOST_BYTES:
+        finer = refined_counts(table, _WORTH * how.tolerance)
+        most = max(map(max, finer.values()))
+        if finer == counts or most > MOST_NODES or _size(grating, finer, elements) > MOST_BYTES:
             break
         counts = finer
     header |= {"processor_seconds": round(work.processor_seconds, 1)}
-    warn_of_error(header)
+    apart, line = grating.structure.fringes(how.wavelengths[0])
+    warn_of_error(header, f"; {line}" if apart < np.inf else "")
     return table
-
-
-def _solved_at_nodes(
-    problem: Problem, counts: Mapping[int, Counts], jobs: Jobs, elements: int
-) -> tuple[Problem, dict[Place, Complex]]:
-    """Solve all nodes, at a higher resolution if solutions have light from nothing."""
-    along = _nodes(problem.grating)
-    places = [place for band in counts for place in places_of(band, counts[band], along)]
-    size = _size(problem.grating, counts, elements)
-    for _ in range(_RAISED):
-        announce_stage("solving", problem, jobs, places, size)
-        solved = jobs.amplitudes(problem, places, "solving orders")
-        excess = max(float(powers(values).sum(axis=2).max()) for values in solved.values())
-        if excess <= MOST_EXCESS:
-            return problem, solved
-        problem = finer_problem(problem)
-    raise DiffractionError(
-        f"efficiencies of a solution sum to {excess:.4g}, also at resolution {problem.resolution}; "
-        "use another method, a higher resolution, or a smoother profile"
-    )
 
 
 def _size(grating: Grating, counts: Mapping[int, Counts], elements: int) -> float:
@@ -264,26 +239,48 @@ def _nodes(grating: Grating) -> Callable[[int], Real]:
     return cells.even_nodes if grating.block else cells.nodes
 
 
-def _refined_counts(
-    counts: Mapping[int, Counts], missed: Real, excess: float, block: bool
-) -> dict[int, Counts]:
-    """Return more nodes for as few bands as bring the error down to the tolerance.
+def refined_counts(table: OrderTable, worth: float) -> dict[int, Counts]:
+    """Return more nodes where the series of efficiencies fall off slowest.
 
-    Even nodes of blocks are halved in all bands, so that the old ones are nodes again.
+    worth : last terms of all series over the light in orders, at which the nodes stay as they are:
+        then the rest of a table's error is that of its look-up.
 
-    missed : error of each band, a share of all light; excess : error over tolerance.
+    Even nodes of blocks are halved in all bands, so that the old ones are nodes again. Elsewhere an
+    axis of a band counts by its last two terms, and by the band's share of diffuse white light.
     """
-    if block:
-        return {k: Counts(*(2 * n - 1 for n in of_band)) for k, of_band in counts.items()}
-    order = np.argsort(-missed)
-    gained = _GAINED * np.cumsum(missed[order])
-    enough = int(np.searchsorted(gained, (1.0 - 1.0 / excess) * missed.sum())) + 1
-    return {
-        k: Counts(*(n if n == 1 else min(int(np.ceil(_FINER * n)), MOST_NODES) for n in of_band))
-        if k in order[:enough]
-        else of_band
-        for k, of_band in counts.items()
-    }
+    if table.block:
+        return {band.k: Counts(*(2 * n - 1 for n in band.counts)) for band in table.bands}
+    size = len(table.bands)
+    band = cells.to_cell(*diffuse_light(4096, table.wavelengths), table.optical_period).band
+    shares = np.bincount(np.minimum(band, size - 1), minlength=size) / len(band)
+    left = [[_last_terms(kind, table.sides) for kind in band.kinds] for band in table.bands]
+    most = np.array([np.max(of_band, axis=0) for of_band in left])
+    most *= np.maximum(shares, 1.0 / (16 * size))[:, None]
+    missed, light = most[:, :3], most[:, 3].sum()
+    counts = np.array([band.counts for band in table.bands])
+    largest = np.argsort(-missed, axis=None)
+    enough = int(np.searchsorted(missed.ravel()[largest].cumsum(), _GAINED * missed.sum())) + 1
+    finer = np.isin(np.arange(missed.size), largest[:enough]).reshape(missed.shape)
+    finer &= missed.sum() > worth * light
+    more = np.minimum(np.ceil(_FINER * counts), MOST_NODES).astype(int)
+    counts = np.where(finer & (counts > 1), more, counts)
+    return {k: Counts(*of_band) for k, of_band in enumerate(counts.tolist())}
+
+
+def _last_terms(values: NDArray[np.float32], sides: int) -> list[float]:
+    """Return the last two terms of series along τ, ρ and w, and the light.
+
+    values : (τ, ρ, w, j, q, n) at Chebyshev nodes. Order 0 is no colour, and is left out.
+    """
+    coloured = values.astype(float)
+    if (channels := values.shape[3] // sides) > 1:
+        coloured *= 1.0 - np.tile(np.eye(channels), (sides, sides))[..., None]
+    found = []
+    for axis, count in enumerate(values.shape[:3]):
+        terms = np.moveaxis(dct(coloured, axis=axis), axis, 0) / count
+        last = np.sqrt((terms[-2:] ** 2).sum(axis=(0, -1)))
+        found.append(float(last.sum(axis=-1).mean()) if count > 1 else 0.0)
+    return [*found, float(coloured[..., 0].sum(axis=-1).mean())]
 
 
 def _lossless(amplitudes: Complex) -> Real:
@@ -296,13 +293,3 @@ def _lossless(amplitudes: Complex) -> Real:
     others /= np.maximum(others.sum(axis=-1, keepdims=True), 1.0)
     others[..., port, port] = np.maximum(lit - others.sum(axis=-1), 0.0)
     return others[..., None]
-
-
-def _limited(count: int, amplitudes: Complex) -> Real:
-    """Return the first elements of the Mueller matrices of amplitudes, (w, j, q, count).
-
-    Amplitudes are scaled where their powers sum to more than 1.
-    """
-    total = powers(amplitudes).sum(axis=2)
-    matrices = mueller_of(amplitudes / np.sqrt(np.maximum(total, 1.0))[..., None, None])
-    return matrices.reshape(*matrices.shape[:-2], MUELLER)[..., :count]

@@ -26,7 +26,7 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,22 +52,23 @@ class SolvedRecipe:
 
     Attributes
     ----------
-    profile, material, superstrate, thin, settings, layers, beneath, substrate : arguments of
-        `solve_orders`.
-    block : whether the profile is a block's face.
-    output : path of the table.
+    output : path of the table; other attributes are arguments of `solve_orders`.
     """
 
     profile: Profile | HeightField
-    material: str
-    superstrate: float
-    thin: bool
-    settings: Settings
     output: Path
+    material: str = "Al"
+    superstrate: float = 1.0
+    thin: bool = False
+    block: bool = False
     layers: Layers = ()
     beneath: Layers = ()
     substrate: str | None = None
-    block: bool = False
+    settings: Settings = field(default_factory=Settings)
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of `solve_orders`."""
+        return {name: value for name, value in vars(self).items() if name != "output"}
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SolvedRecipe:
@@ -101,15 +102,15 @@ class SolvedRecipe:
                 profile = profile_of(content.get("profile"), arguments, file.parent)
             return cls(
                 profile,
+                path_beside(file, output, output=True),
                 str(content.get("material", "Al")),
                 number_between(content.get("superstrate", 1.0), "superstrate", 1, 5),
                 _flag(content, "thin"),
-                _settings(content),
-                path_beside(file, output, output=True),
+                _flag(content, "block"),
                 layers,
                 beneath,
                 None if substrate is None else str(substrate),
-                _flag(content, "block"),
+                _settings(content),
             )
         except DiffractionError as error:
             raise DiffractionError(f"{shown}: {error}") from error

@@ -67,8 +67,8 @@ def resolved(
             break
         fine = finer_problem(coarse)
         finer = jobs.solve(fine, places, text)
-        lit = _incident(values, ports)
-        after = _incident(finer, ports)
+        lit = incident(values, ports)
+        after = incident(finer, ports)
         error = _changed(problem, [(lit[place], after[place]) for place in places])
         if given:
             return Chosen(problem, error)
@@ -89,7 +89,7 @@ def resolved(
     )
 
 
-def _incident(solved: Mapping[Any, Real], ports: Ports | None) -> dict[Any, Real]:
+def incident(solved: Mapping[Any, Real], ports: Ports | None) -> dict[Any, Real]:
     """Return the efficiencies (w, j, 2, q, 2) of light that is incident in some ports j."""
     if ports is None:
         return dict(solved)
@@ -147,7 +147,7 @@ def reciprocity_error(solved: Mapping[Any, Real], sides: int, ports: Ports | Non
         for place, values in solved.items()
         if isinstance(place, Place) and place.tau == 0.5
     }
-    lit = _incident(differences, ports).values()
+    lit = incident(differences, ports).values()
     sums = (float(each.sum(axis=-1).mean(axis=2).sum(axis=-1).max()) for each in lit)
     return max(sums, default=0.0)
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from ...arrays import Complex
+from ...errors import DiffractionError
 from ...heights.lengths import count_between, number_between
-from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, solver_of
+from .jobs import AUTO, MOST_RESOLUTION, Jobs, Problem, Spot, solver_of
 from .nodes import AnyPlace
-from .resolution import STEP, Chosen, coarsest
+from .resolution import Chosen, Ports, finer_problem, incident
 
 #: Wavelengths of a table, nm: the visible.
 WAVELENGTHS = (380.0, 780.0)
@@ -20,6 +24,8 @@ _TIMED = 5
 #: Sum over the orders of a solution from which on it is refused; smaller sums above 1, which come
 #: of coarse solutions near grazing, are scaled to 1.
 MOST_EXCESS = 1.1
+#: Times that the resolution is raised, if solutions have light from nothing.
+_RAISED = 3
 
 
 class Estimate(NamedTuple):
@@ -79,25 +85,41 @@ def header_of(chosen: Chosen, how: Settings) -> dict[str, Any]:
 
 
 def announce_stage(
-    stage: str, problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], size: float = 0.0
-) -> None:
-    """Time some of the stage's missing stations and announce it; size : of its table, bytes."""
+    stage: str, problem: Problem, jobs: Jobs, places: Sequence[AnyPlace], size: float = 0.0,
+    cost: float = 1.0,
+) -> None:  # fmt: skip
+    """Solve some of the stage's missing stations, and announce the time of all.
+
+    size : of the table, bytes; cost : of the stage, over its cost if all is solved once.
+    """
     if jobs.announce is None or not (places := jobs.missing(problem, places)):
         return
     some = places[len(places) // (2 * _TIMED) :: max(len(places) // _TIMED, 1)]
-    seconds = sum(jobs.seconds(problem, place) for place in some)
+    before = jobs.processor_seconds
+    jobs.amplitudes(problem, some, "estimating the time")
     solutions = sum(len(place.w) for place in places)
-    seconds *= solutions / sum(len(place.w) for place in some)
-    jobs.announce(Estimate(stage, len(places), solutions, seconds, size))
+    each = (jobs.processor_seconds - before) / sum(len(place.w) for place in some)
+    jobs.announce(Estimate(stage, len(places), solutions, cost * each * solutions, size))
 
 
-def announce_comparison(problem: Problem, jobs: Jobs, places: Sequence[AnyPlace]) -> None:
-    """Time a solution at the first resolution, and announce the comparison with the next one."""
-    if jobs.announce is None:
-        return
-    first = replace(problem, resolution=problem.resolution or coarsest(problem))
-    seconds = jobs.seconds(first, places[0]) / len(places[0].w)
-    solutions = sum(len(place.w) for place in places)
-    # a solution costs as its matrices: the cube of the resolution
-    both = seconds * solutions * (1.0 + STEP**3)
-    jobs.announce(Estimate("choosing the resolution", len(places), 2 * solutions, both))
+def solved_stage(
+    problem: Problem, jobs: Jobs, places: Sequence[Spot], size: float, ports: Ports | None = None
+) -> tuple[Problem, dict[Spot, Complex]]:
+    """Solve places of a table, at a higher resolution if solutions have light from nothing.
+
+    size : of the table, bytes; ports : whose light is asked for, see `resolution.resolved`.
+
+    Raises a DiffractionError if they still have.
+    """
+    for _ in range(_RAISED):
+        announce_stage("solving", problem, jobs, places, size)
+        solved = jobs.amplitudes(problem, places, "solving orders")
+        lit = incident({place: np.abs(values) ** 2 for place, values in solved.items()}, ports)
+        excess = max(float(values.sum(axis=(3, 4)).max()) for values in lit.values())
+        if excess <= MOST_EXCESS:
+            return problem, solved
+        problem = finer_problem(problem)
+    raise DiffractionError(
+        f"efficiencies of a solution sum to {excess:.4g}, also at resolution {problem.resolution}; "
+        "use another method, a higher resolution, or a smoother profile"
+    )

@@ -65,6 +65,11 @@ class Grating:
         return 2 if self.thin or self.block else 1
 
     @property
+    def media(self) -> tuple[float, bool, float | None]:
+        """Return `superstrate`, `thin` and `block` of the grating's table."""
+        return (1.0, False, self.superstrate) if self.block else (self.superstrate, self.thin, None)
+
+    @property
     def cell(self) -> UnitCell | None:
         """Heights of a crossed grating; None of grooves."""
         return self.profile if isinstance(self.profile, UnitCell) else None

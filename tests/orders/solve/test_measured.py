@@ -210,8 +210,8 @@ def test_a_wrong_file_of_efficiencies_is_refused(lines, tmp_path, change, messag
     [
         (lambda axes, variables, units: axes.pop("theta"), "theta"),
         (lambda axes, variables, units: variables.pop("R_p"), "R_p"),
-        (lambda axes, variables, units: axes.update(theta=np.full(18, 3.0)), "different"),
-        (lambda axes, variables, units: axes.update(theta=np.full(18, np.nan)), "finite"),
+        (lambda axes, variables, units: axes.update(theta=np.full(18, 3.0)), "listed twice"),
+        (lambda axes, variables, units: axes.update(theta=np.full(18, np.nan)), "theta nan"),
         (lambda axes, variables, units: axes.update(wavelength=AXES["wavelength"] / 1e3), "unit"),
         (lambda axes, variables, units: units.update(wavelength="THz"), "THz"),
     ],

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.orders.solve import node_counts, orders
+from mitsuba_diffraction.orders import cells
+from mitsuba_diffraction.orders.solve import orders
 from mitsuba_diffraction.orders.solve.grating_index import material_of
 from mitsuba_diffraction.orders.solve.jobs import problem_of
 from mitsuba_diffraction.orders.solve.orders import solve_orders
@@ -59,13 +59,27 @@ def test_no_order_is_lost_or_gained_by_a_perfect_conductor(table):
         assert total == pytest.approx(1, abs=0.02)
 
 
-def test_a_tolerance_that_lines_say_is_out_of_reach_is_refused_before_the_solution(monkeypatch):
-    monkeypatch.setattr(node_counts, "MAX_NODES", (4, 3, 2))
-    exact = replace(SETTINGS, tolerance=1e-4)
-    stages = []
-    with pytest.raises(DiffractionError, match=r"tolerance of 0.01% will not be reached"):
-        solve_orders(PROFILE, "Al", settings=exact, announce=lambda e: stages.append(e.stage))
-    assert stages == ["choosing nodes"]
+def test_a_table_gets_more_nodes_where_its_efficiencies_change_quickest():
+    flat = md.OrderTable.mirror(0.5, 0.5, SETTINGS.wavelengths)
+    at = cells.nodes(6)[:, None]
+    quick = 0.1 / (1 + 900 * (at - 0.4) ** 2)  # along ρ, of order -1 of the last band
+
+    def stretched(values, added):
+        values = np.broadcast_to(values, (6, 6, 6, *values.shape[3:])).copy()
+        values[..., 0, -1, 0] += added
+        return values
+
+    bands = [
+        orders.Band(band.k, *(stretched(v, quick if band is flat.bands[-1] else 0.0)
+                              for v in band.kinds))
+        for band in flat.bands
+    ]  # fmt: skip
+    table = replace(flat, response=orders.CellResponse(tuple(bands)))
+    *others, last = orders.refined_counts(table, 0.0).values()
+    assert others == [(6, 6, 6)] * len(others)
+    assert last == (6, 9, 6)
+    # no terms are as large as all light in orders
+    assert set(orders.refined_counts(table, 1.0).values()) == {(6, 6, 6)}
 
 
 def test_the_size_of_a_table_is_announced_before_it_is_solved(announced):
@@ -101,7 +115,7 @@ def test_a_ridge_that_leans_over_the_next_period_is_moved():
 
 def test_a_table_that_misses_its_tolerance_is_refined_and_then_warned_of(monkeypatch):
     monkeypatch.setattr(orders, "REFINEMENTS", 0)
-    monkeypatch.setattr(node_counts, "_count", lambda *_: (orders.Counts(2, 2, 1), 0.0))
+    monkeypatch.setattr(orders, "COUNTS", orders.Counts(2, 2, 1))
     exact = replace(SETTINGS, tolerance=1e-3, resolution=16)
     with pytest.warns(md.DiffractionWarning, match=r"5 % of directions .tolerance 0.40%"):
         coarse = solve_orders(PROFILE, "none", settings=exact)
