@@ -216,21 +216,23 @@ def _answer(
     lookup = lookup_of(table)
     row = lookup.row(-x, -y, np.where(second, -1.0, 1.0) + 0.0 * x, np.maximum(lam, 1.0))
     below = np.full(len(x), second != transmitted) if lookup.sides == 2 else None
+    order = (m_x, m_y) if table.crossed else m_x
     if matrices:
-        answer = lookup.elements(row, (m_x, m_y), y, active, below)
+        answer = lookup.elements(row, order, y, active, below)
     else:
-        answer = [lookup.share(row, (m_x, m_y), active, below).efficiency]
+        answer = [lookup.share(row, order, active, below).efficiency]
     return np.stack(answer, axis=-1).reshape(*shape, len(answer))
 
 
 def lookup_in(
-    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool
-) -> Lookup:
+    table: OrderTable, memory: Callable[[OrderGrid], Memory], *, coated: bool, elements: bool,
+    chances: bool = False,
+) -> Lookup:  # fmt: skip
     """Return the look-up of a table, with its grid in a memory.
 
-    coated, elements : as for `grid.grid_of`.
+    coated, elements, chances : as for `grid.grid_of`.
     """
-    grid = grid_of(table, coated=coated, elements=elements)
+    grid = grid_of(table, coated=coated, elements=elements, chances=chances)
     held = memory(grid)
     coated = coated and table.superstrate != 1.0
     if isinstance(table.response, ListedResponse) and not coated:

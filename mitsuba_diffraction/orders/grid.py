@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -45,6 +46,10 @@ class OrderGrid(NamedTuple):
         pair of ports; over cells the odd ones over y. None without polarisation.
     element_starts : as `starts`, of `elements`.
     scale : factor from stored numbers to efficiencies.
+    chances : (records, 8) float32, to draw an order at a node: of each node and port that light
+        comes through the chances of all ports side by side, filled up with zeros to whole records.
+        None where nothing is drawn, of blocks and of listed light.
+    chance_starts : as `starts`, of `chances`.
     """
 
     cells: Counts
@@ -53,6 +58,8 @@ class OrderGrid(NamedTuple):
     elements: NDArray[np.float32] | None
     element_starts: NDArray[np.uint32]
     scale: float
+    chances: NDArray[np.float32] | None = None
+    chance_starts: NDArray[np.uint32] | None = None
 
     @property
     def parts(self) -> int:
@@ -60,12 +67,13 @@ class OrderGrid(NamedTuple):
         return self.corners.shape[1] // 8
 
 
-def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
+def grid_of(table: OrderTable, *, coated: bool, elements: bool, chances: bool) -> OrderGrid:
     """Return the records of a table.
 
     coated : whether the reflections between the flat face of its superstrate and the grating are
         in the efficiencies; otherwise these are of the grating alone.
     elements : whether the grid has elements of Mueller matrices, where the table has any.
+    chances : whether the grid has chances of orders at nodes, where its corners mix linearly.
     """
     response = table.response
     if isinstance(response, ListedResponse) and not (coated and table.superstrate != 1.0):
@@ -87,13 +95,21 @@ def grid_of(table: OrderTable, *, coated: bool, elements: bool) -> OrderGrid:
             values = smooth_elements(table, of.band, values)
         return resampled(table, of.band, values, counts, coated).reshape(-1, values.shape[-1])
 
+    def at_nodes(efficiencies: Real) -> Real:
+        missing = -efficiencies.shape[-1] % 8
+        return np.pad(efficiencies, [(0, 0)] * 4 + [(0, missing)]).reshape(-1, 8)
+
     kinds = list(kinds_of(table))
-    starts, corners, scale = _corners(list(map(efficiencies, kinds)))
-    if not (elements and table.response.elements > 1):
-        return OrderGrid(counts, starts, corners, None, starts, scale)
-    stored = [(matrices(of) / scale).astype(np.float32) for of in kinds]
-    first = _starts(list(map(len, stored)))
-    return OrderGrid(counts, starts, corners, np.concatenate(stored), first, scale)
+    parts = list(map(efficiencies, kinds))
+    starts, corners, scale = _corners(parts)
+    grid = OrderGrid(counts, starts, corners, None, starts, scale)
+    if elements and table.response.elements > 1:
+        element_starts, stored = _joined(map(matrices, kinds), scale)
+        grid = grid._replace(elements=stored, element_starts=element_starts)
+    if chances and not table.block:
+        chance_starts, stored = _joined((at_nodes(of_kind[-1]) for of_kind in parts), scale)
+        grid = grid._replace(chances=stored, chance_starts=chance_starts)
+    return grid
 
 
 def _listed(table: OrderTable, response: ListedResponse, elements: bool) -> OrderGrid:
@@ -157,6 +173,12 @@ def _corners(kinds: list[list[Real]]) -> tuple[NDArray[np.uint32], NDArray[np.fl
 def _with_sum(values: Real) -> Real:
     """Return efficiencies (…, ports) followed by their sum."""
     return np.concatenate([values, values.sum(axis=-1, keepdims=True)], axis=-1)
+
+
+def _joined(kinds: Iterable[Real], scale: float) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+    """Return the first record of each kind, and the records (n, …) of all, over the scale."""
+    stored = [(records / scale).astype(np.float32) for records in kinds]
+    return _starts(list(map(len, stored))), np.concatenate(stored)
 
 
 def _starts(records: list[int]) -> NDArray[np.uint32]:

@@ -10,7 +10,7 @@ from ..arrays import Real
 from ..optics.arithmetic import Mask, Number, of
 from ..optics.orders import crossed_square, order_factor
 from .grid import OrderGrid
-from .lookup import RAISED, Index, Lookup, Memory, Order, Share, corner_weights
+from .lookup import RAISED, Index, Lookup, Memory, Share, corner_weights
 from .polarised import ODD, about_s, turned_axes
 from .response import LARGEST_SUM, ListedResponse
 from .table import OrderTable
@@ -50,9 +50,9 @@ class ListedRow(NamedTuple):
 class ListedLookup(Lookup):
     """Rows of a table of listed light, without a coat.
 
-    Where directions are missing, an order has the efficiency of ωi or of the reversed light from
-    ωo, which is reciprocal to it: the nearer to a listed direction counts. Mueller matrices belong
-    to ωi.
+    Orders are whole numbers, or pairs (m_x, m_y) on crossed gratings. Where directions are missing,
+    an order has the efficiency of ωi or of the reversed light from ωo, which is reciprocal to it:
+    the nearer to a listed direction counts. Mueller matrices belong to ωi.
 
     Attributes
     ----------
@@ -129,15 +129,16 @@ class ListedLookup(Lookup):
         """See `lookup.Lookup.ports`."""
         return self.count * self.sides + 0 * row.start
 
-    def order_at(self, row: Any, port: Index) -> tuple[Order, Mask]:
+    def order_at(self, row: Any, port: Index) -> tuple[Any, Mask]:
         """See `lookup.Lookup.order_at`."""
         below = port >= self.count
         place = port
         if self.sides == 2:
             place = port - of(row.wavelength).where(below, self.count + 0 * port, 0 * port)
-        return self.order_of_port(place, of(row.wavelength)), below
+        order = self.order_of_port(place, of(row.wavelength))
+        return (order if self._crossed else order[0]), below
 
-    def order_of_port(self, place: Index, xp: Any = None) -> Order:
+    def order_of_port(self, place: Index, xp: Any = None) -> tuple[Number, Number]:
         """Return m_x and m_y of a place among the orders of a side."""
         xp = xp or of(place)
         along = place // self._size[0]
@@ -145,15 +146,16 @@ class ListedLookup(Lookup):
         return m_x, xp.number(along) + float(self._first[1])
 
     def port(
-        self, row: Any, order: Order, active: Mask = True, below: Mask | None = None
+        self, row: Any, order: Any, active: Mask = True, below: Mask | None = None
     ) -> tuple[Index, Mask]:
         """See `lookup.Lookup.port`."""
         xp = of(row.wavelength)
-        square = self._square(row, *order)
+        m_x, m_y = order if self._crossed else (order, 0.0 * row.wavelength)
+        square = self._square(row, m_x, m_y)
         if self.index != 1.0:
             square = square + xp.where(below, 0.0, self.index**2 - 1.0)
         leaves = active & (square > 0.0)
-        places = [m - float(first) for m, first in zip(order, self._first, strict=True)]
+        places = [m - float(first) for m, first in zip((m_x, m_y), self._first, strict=True)]
         for place, size in zip(places, self._size, strict=True):
             leaves = leaves & (place >= 0.0) & (place < float(size))
         place = places[1] * float(self._size[0]) + places[0]
@@ -162,9 +164,7 @@ class ListedLookup(Lookup):
             port = port + xp.where(below, self.count + 0 * port, 0 * port)
         return port, leaves
 
-    def share(
-        self, row: Any, order: Order, active: Mask = True, below: Mask | None = None
-    ) -> Share:
+    def share(self, row: Any, order: Any, active: Mask = True, below: Mask | None = None) -> Share:
         """See `lookup.Lookup.share`."""
         xp = of(row.wavelength)
         if self._gaps:
@@ -181,16 +181,17 @@ class ListedLookup(Lookup):
         """See `lookup.Lookup.total`."""
         return row.total * RAISED if self._gaps else super().total(row, active)
 
-    def _either(self, row: Any, order: Order, active: Mask, below: Mask | None) -> Number:
+    def _either(self, row: Any, order: Any, active: Mask, below: Mask | None) -> Number:
         """Return an order's efficiency between that of ωi and that of the reversed light from ωo.
 
         Each has the weight of the other's squared distance from a listed direction.
         """
         xp = of(row.wavelength)
         port, leaves = self.port(row, order, active, below)
+        m_x, m_y = order if self._crossed else (order, 0.0 * row.wavelength)
         x, y = (
             m * row.wavelength * step - part
-            for m, step, part in zip(order, self._steps, (row.x, row.y), strict=True)
+            for m, step, part in zip((m_x, m_y), self._steps, (row.x, row.y), strict=True)
         )
         up = 1.0 + 0.0 * row.x
         back = self._row(x, y, up if below is None else xp.where(below, -up, up), row.wavelength)
@@ -203,7 +204,7 @@ class ListedLookup(Lookup):
         return xp.where(leaves, forth + (reverse - forth) * share, 0.0)
 
     def elements(
-        self, row: Any, order: Order, y: Number, active: Mask = True,
+        self, row: Any, order: Any, y: Number, active: Mask = True,
         below: Mask | None = None,
     ) -> list[Number]:  # fmt: skip
         """See `lookup.Lookup.elements`; only the sign of y is used, on grooves."""

@@ -34,8 +34,6 @@ _MIN_DIVISOR = 1e-7
 RAISED = 1.0 + 2.0**-10
 
 Index = Number
-#: Order (m_x, m_y); m_y is 0 of grooves.
-Order = Sequence[Number]
 
 
 class Memory(Protocol):
@@ -137,6 +135,7 @@ class Lookup:
         self._cells, self._parts = grid.cells, grid.parts
         self._scale = grid.scale
         self.numbers = 0 if grid.elements is None else grid.elements.shape[1]
+        self.has_chances = grid.chances is not None
         self._period, self._last = 1e3 * table.optical_period, float(table.last_band)
         self._ends, self._reach = table.wavelengths, table.reach
         self._step = 1e-3 / table.period
@@ -183,29 +182,27 @@ class Lookup:
         """Return the number of a row's ports."""
         return row.channels * self.sides if self.sides == 2 else row.channels
 
-    def order_at(self, row: Any, port: Index) -> tuple[Order, Mask]:
+    def order_at(self, row: Any, port: Index) -> tuple[Number, Mask]:
         """Return the order of a port, and whether it leaves on the second side."""
         xp = of(row.wavelength)
         below = port >= row.channels
         q = port - xp.where(below, row.channels, 0) if self.sides == 2 else port
-        return (xp.number(row.channel) - xp.number(q), 0.0 * row.wavelength), below
+        return xp.number(row.channel) - xp.number(q), below
 
     def port(
-        self, row: Any, order: Order, active: Mask = True, below: Mask | None = None
+        self, row: Any, order: Any, active: Mask = True, below: Mask | None = None
     ) -> tuple[Index, Mask]:
         """Return an order's port, and whether it propagates."""
         xp = of(row.wavelength)
-        q = xp.number(row.channel) - order[0]
+        q = xp.number(row.channel) - order
         propagates = active & (q >= 0.0) & (q < xp.number(row.channels))
         port = xp.index(xp.where(propagates, q, 0.0))
         if below is not None:
             port = port + xp.where(below, row.channels, 0)
         return port, propagates
 
-    def share(
-        self, row: Any, order: Order, active: Mask = True, below: Mask | None = None
-    ) -> Share:
-        """Return the light of an order; 0 if it does not propagate or inactive.
+    def share(self, row: Any, order: Any, active: Mask = True, below: Mask | None = None) -> Share:
+        """Return the light of an order, a whole number; 0 if it does not propagate or inactive.
 
         below : whether it leaves below a sheet; None without a sheet.
         """
@@ -214,21 +211,21 @@ class Lookup:
         if not self.coated:
             efficiency = xp.where(propagates, self.at_port(row, port, 0, propagates), 0.0)
             return Share(efficiency, efficiency)
-        square = order_direction(row.x, row.y, order[0], self._step * row.wavelength).square
+        square = order_direction(row.x, row.y, order, self._step * row.wavelength).square
         leaves = propagates & (square > 0.0)
         through = self._through(xp.sqrt(xp.maximum(square, 0.0)))
-        mirror = xp.where(order[0] == 0.0, row.face, 0.0)
+        mirror = xp.where(order == 0.0, row.face, 0.0)
         shares = (
             self.at_port(row, port, 0, propagates) * passage(through, self._kept),
             self.at_port(row, port, 1, propagates),
         )
         return Share(*(xp.where(leaves, xp.fma(row.entering, s, mirror), 0.0) for s in shares))
 
-    def repeated(self, row: Row, order: Order, active: Mask = True) -> Number:
+    def repeated(self, row: Row, order: Number, active: Mask = True) -> Number:
         """Return an order's efficiency within the coat, with all reflections between its face."""
         xp = of(row.wavelength)
         port, propagates = self.port(row, order, active)
-        square = order_direction(row.x, row.y, order[0], self._step * row.wavelength).square
+        square = order_direction(row.x, row.y, order, self._step * row.wavelength).square
         ends = 1.0 - row.face, self._through(xp.sqrt(xp.maximum(square, 0.0)))
         came, left = (1.0 - self._kept * (1.0 - end) for end in ends)
         return self.at_port(row, port, 0, propagates) * xp.reciprocal(xp.sqrt(came * left))
@@ -244,7 +241,7 @@ class Lookup:
         return value * RAISED
 
     def elements(
-        self, row: Any, order: Order, y: Number, active: Mask = True, below: Mask | None = None
+        self, row: Any, order: Any, y: Number, active: Mask = True, below: Mask | None = None
     ) -> list[Number]:
         """Return the first elements of the Mueller matrix of an order, row by row.
 
@@ -261,14 +258,23 @@ class Lookup:
         """Interpolate elements; first : record of node 0, and stride records each."""
         xp = of(row.wavelength)
         totals: list[Number] = [0.0 * row.wavelength] * self.numbers
-        n_rho, n_w = self._cells.rho, self._cells.w
-        tau, rho, w = row.cell // (n_rho * n_w), (row.cell // n_w) % n_rho, row.cell % n_w
-        corner = (tau * (n_rho + 1) + rho) * (n_w + 1) + w
-        for weight, (a, b, c) in zip(row.weights, itertools.product((0, 1), repeat=3), strict=True):
-            node = corner + (a * (n_rho + 1) + b) * (n_w + 1) + c
+        for weight, node in zip(row.weights, self.nodes(row), strict=True):
             record = self.memory.read("elements", first + node * stride, self.numbers, active)
             totals = [xp.fma(weight, x, sum_) for x, sum_ in zip(record, totals, strict=True)]
         return totals
+
+    def nodes(self, row: Any) -> list[Index]:
+        """Return the numbers of the nodes at a cell's corners, 000, 001, 010 … 111."""
+        n_rho, n_w = self._cells.rho, self._cells.w
+        tau, rho, w = row.cell // (n_rho * n_w), (row.cell // n_w) % n_rho, row.cell % n_w
+        first = (tau * (n_rho + 1) + rho) * (n_w + 1) + w
+        corners = itertools.product((0, 1), repeat=3)
+        return [first + (a * (n_rho + 1) + b) * (n_w + 1) + c for a, b, c in corners]
+
+    def totals(self, row: Row) -> Sequence[Number]:
+        """Return the sums of chances at the corners of a cell, over the grid's scale."""
+        record = (row.start + self.ports(row)) * self._parts + self._parts - 1
+        return self.memory.read("corners", record, 8, row.lit)
 
     def at_port(self, row: Any, port: Index, part: int, active: Mask) -> Number:
         """Interpolate a port between the corners of a cell; 0 where the table has no light."""
@@ -337,7 +343,7 @@ class BlockLookup(Lookup):
         return BlockRow(row, own, entering, flat, mirror, scale)
 
     def share(
-        self, row: Any, order: Order, active: Mask = True, below: Mask | None = None
+        self, row: Any, order: Number, active: Mask = True, below: Mask | None = None
     ) -> Share:
         """See `Lookup.share`."""
         xp = of(row.wavelength)

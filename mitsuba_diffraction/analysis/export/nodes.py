@@ -331,10 +331,8 @@ class _Orders:
                         for part in (m, waves))  # fmt: skip
             flat = np.zeros(len(waves))
             row: Any = self._lookup.row(flat + x, flat + y, flat + wi[2], waves)
-            share = (
-                self._lookup.share(row, tuple(m.T.astype(float)), flat == 0.0).efficiency
-                / _LOBE_SAMPLES
-            )
+            order: Any = tuple(m.T.astype(float)) if self._table.crossed else m[:, 0].astype(float)
+            share = self._lookup.share(row, order, flat == 0.0).efficiency / _LOBE_SAMPLES
             kernel = np.broadcast_to(spread / wavenumber(lam)[:, None], centre.shape)[leaves]
             middle_of = centre[leaves]
             across = middle_of + kernel
@@ -344,5 +342,5 @@ class _Orders:
             across = across @ self._turn
             z = np.sqrt(np.maximum(1.0 - (across**2).sum(axis=-1), 0.0))
             p, q = nodes.place(wi, np.column_stack([across, z]))
-            light[:, column] = nodes.hats(p, q) @ share / _LOBE_SAMPLES
+            light[:, column] = nodes.hats(p, q) @ share
         return light

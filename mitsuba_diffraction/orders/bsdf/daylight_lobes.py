@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -18,7 +19,7 @@ from ...plugin.memory import index_between, read_record, upload
 from ...plugin.sampling import invert
 from ...plugin.types import Colour, Context, Float, Index, Interaction, Vector2f
 from ..daylight import CHANNELS, ENDS, daylight_weights
-from ..lookup import Order, corner_weights, weighted
+from ..lookup import corner_weights, weighted
 from .lobes import MIN_SUM, REACH, Below, Draw, OrderLobe, wavenumber_of
 
 #: Tangential part and cosine of ωi, in the patch's frame.
@@ -74,7 +75,7 @@ class DaylightLobes:
         return mi.Color3f(*(self.lookup.total(row) for row in rows))
 
     def shares(
-        self, light: Incidence, below: Below, wavelength: Float, order: Order
+        self, light: Incidence, below: Below, wavelength: Float, order: Any
     ) -> tuple[Float, Float]:
         """Return the efficiency of an order, and its probability."""
         incident, cos_i = light
@@ -92,7 +93,7 @@ class DaylightLobes:
             node = read_record(self._order_0, n, 8)
             k = wavenumber_of(node[CHANNELS])
             peak = lobe_peak(k, self.sigma)
-            value, share = self.shares(light, below, node[CHANNELS], mi.Vector2f(0.0))
+            value, share = self.shares(light, below, node[CHANNELS], self._window.mirrored())
             lobe = peak * dr.exp(-math.pi * radius * peak)
             return added(sums, node, lobe, value * horizon_correction(into, out, k), share)
 
@@ -100,54 +101,71 @@ class DaylightLobes:
         return sum_of(count, add, (light, [radius, *levels]), [mi.Float(0.0)] * CHANNELS)
 
     def others(self, light: Incidence, below: Below, uv: Vector2f, radius: Float) -> list[Float]:
-        """Sum all orders but (0, 0), each where it is largest, for colours and the density.
-
-        With q_m = 2π (m_x/d_x, m_y/d_y): k_m = q_m·(u, v)/ρ², and the lobe is smaller by
-        exp(−σ² (q_m × (u, v))²/ρ²).
-        """
-        square = maximum(radius, 1e-8)
-        variance = dr.rcp(square) * (0.5 / self.sigma**2)
-        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
-        units = [2.0 * math.pi / period for period in self._window.periods]
-        shortest, longest = self.waves
+        """Sum all other orders, for red, green, blue and the density."""
         if self._window.crossed:
-            count, first = mi.UInt32(self.lookup.count), mi.Float(0.0)
-        else:
-            count, first = self._reached(uv, radius)
-
-        def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
-            light, (u, v, square, first, variance, scale) = inputs
-            if self._window.crossed:
-                order = self.lookup.order_of_port(n)
-            else:
-                order = dr.mulsign(first + mi.Float(n), u), mi.Float(0.0)
-            q_x, q_y = order[0] * units[0], order[1] * units[1]
-            k = (q_x * u + q_y * v) * dr.rcp(square)
-            aside = dr.square(self.sigma * (q_x * v - q_y * u)) * dr.rcp(square)
-            lit = (k > shortest) & (k < longest) & (aside < REACH)
-            k = dr.select(lit, k, longest)
-            weights = self.weights(k, variance)
-            value, share = self.shares(light, below, 2e3 * math.pi * dr.rcp(k), order)
-            lobe = dr.select(lit, scale * dr.exp(-aside), 0.0)
-            return added(sums, weights, lobe, value, share)
-
-        inputs = light, [uv.x, uv.y, square, first, variance, scale]
-        return sum_of(count, add, inputs, [mi.Float(0.0)] * CHANNELS)
-
-    def _reached(self, uv: Vector2f, radius: Float) -> tuple[Index, Float]:
-        """Return the number of orders of grooves that have light, and the first one's |m|."""
+            return self._others_of_pairs(light, below, uv, radius)
+        u, v = uv.x, uv.y
+        unit = 2.0 * math.pi / self.period
+        square = maximum(radius, 1e-8)
         # k_m = m · step, of the sign of u
-        step = wavenumber_step(uv.x, uv.y, self.period)
-        aside = lobe_falloff(uv.x, uv.y, self.sigma, self.period)
+        step = wavenumber_step(u, v, self.period)
+        aside = lobe_falloff(u, v, self.sigma, self.period)
         first = maximum(dr.ceil(self.waves[0] * dr.rcp(step)), 1.0)
         last = minimum(
             dr.floor(self.waves[1] * dr.rcp(step)),
             dr.sqrt(REACH * dr.rcp(maximum(aside, 1e-8))),
         )
-        per_order = self.waves[1] * self.period / (2.0 * math.pi)
-        most = float(int(2.0 * self.lookup.index * per_order) + 1)
-        lit = (last >= first) & (radius * per_order**2 > 0.25)
-        return dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, most)), 0), first
+        most = int(2.0 * self.lookup.index * self.waves[1] / unit) + 1
+        lit = (last >= first) & (radius * (self.waves[1] / unit) ** 2 > 0.25)
+        count = dr.select(lit, index_of(index_between(last - first + 1.0, 0.0, float(most))), 0)
+        variance, scale = self.smoothing(square)
+
+        def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
+            light, (step, aside, variance, scale) = inputs
+            m = first + mi.Float(n)
+            k = m * step
+            weights = self.weights(k, variance)
+            wavelength = 2e3 * math.pi * dr.rcp(k)
+            value, share = self.shares(light, below, wavelength, dr.mulsign(m, u))
+            lobe = scale * dr.exp(-aside * dr.square(m))
+            return added(sums, weights, lobe, value, share)
+
+        inputs = light, [step, aside, variance, scale]
+        return sum_of(count, add, inputs, [mi.Float(0.0)] * CHANNELS)
+
+    def _others_of_pairs(
+        self, light: Incidence, below: Below, uv: Vector2f, radius: Float
+    ) -> list[Float]:
+        """Sum the orders of a crossed grating but (0, 0), each where it is largest.
+
+        With q_m = 2π (m_x/d_x, m_y/d_y): k_m = q_m·(u, v)/ρ², and the lobe is smaller by
+        exp(−σ² (q_m × (u, v))²/ρ²).
+        """
+        square = maximum(radius, 1e-8)
+        variance, scale = self.smoothing(square)
+        units = [2.0 * math.pi / period for period in self._window.periods]
+        first, last = self.waves
+
+        def add(n: Index, inputs: tuple[Incidence, list[Float]], sums: list[Float]) -> list[Float]:
+            light, (u, v, square, variance, scale) = inputs
+            order = mi.Vector2f(*self.lookup.order_of_port(n))
+            q_x, q_y = order.x * units[0], order.y * units[1]
+            k = (q_x * u + q_y * v) * dr.rcp(square)
+            aside = dr.square(self.sigma * (q_x * v - q_y * u)) * dr.rcp(square)
+            lit = (k > first) & (k < last) & (aside < REACH)
+            k = dr.select(lit, k, last)
+            weights = self.weights(k, variance)
+            value, share = self.shares(light, below, 2e3 * math.pi * dr.rcp(k), order)
+            lobe = dr.select(lit, scale * dr.exp(-aside), 0.0)
+            return added(sums, weights, lobe, value, share)
+
+        inputs = light, [uv.x, uv.y, square, variance, scale]
+        return sum_of(self.lookup.count, add, inputs, [mi.Float(0.0)] * CHANNELS)
+
+    def smoothing(self, square: Float) -> tuple[Float, Float]:
+        """Return the variance of `weights`, and the scale of lobes, for u² + v²."""
+        scale = self.sigma * dr.rsqrt(square) * (1.0 / math.sqrt(math.pi))
+        return dr.rcp(square) * (0.5 / self.sigma**2), scale
 
     def weights(self, k: Float, variance: Float) -> list[Float]:
         """Interpolate the smoothed weights of a wavenumber."""

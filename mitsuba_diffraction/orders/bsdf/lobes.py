@@ -35,7 +35,7 @@ from ...plugin.types import (
 )
 from ..efficiency import lookup_in
 from ..grid import OrderGrid
-from ..lookup import Lookup, Order
+from ..lookup import RAISED, Lookup
 from ..table import OrderTable
 
 #: Mask of lanes whose ωo lies below a sheet; None without a sheet.
@@ -61,7 +61,7 @@ class Lit(NamedTuple):
     row: Any
     value: Float
     peak: Float
-    terms: list[tuple[Vector2f, Float, Float]]
+    terms: list[tuple[Any, Float, Float]]
 
 
 class Draw(NamedTuple):
@@ -74,6 +74,10 @@ class Draw(NamedTuple):
     uv: Vector2f
     below: Mask
     valid: Mask
+
+
+#: Against division by 0, in single precision.
+_MIN_DIVISOR, _SMALLEST = 1e-7, 2.0**-126
 
 
 class Device:
@@ -107,14 +111,16 @@ class Device:
 def order_lookup(table: OrderTable) -> Lookup:
     """Return the look-up of a table in the current variant."""
     elements = mi.is_polarized and table.polarised
-    return lookup_in(table, Device, coated=True, elements=elements)
+    return lookup_in(table, Device, coated=True, elements=elements, chances=True)
 
 
-def draw(lookup: Lookup, row: Any, sample: Float) -> tuple[Order, Mask, Mask]:
+def draw(lookup: Lookup, row: Any, sample: Float) -> tuple[Any, Mask, Mask]:
     """Draw an order by its efficiency over `Lookup.total`.
 
-    Returns (m_x, m_y), whether the order leaves on the second side, and whether there is any.
+    Returns the order, whether it leaves on the second side, and whether there is any.
     """
+    if lookup.has_chances:
+        return _drawn_at_a_corner(lookup, row, sample)
     target, ports = sample * lookup.total(row), mi.UInt32(lookup.ports(row))
 
     def body(port: Index, reached: Float) -> tuple[Index, Float]:
@@ -130,14 +136,55 @@ def draw(lookup: Lookup, row: Any, sample: Float) -> tuple[Order, Mask, Mask]:
     return *lookup.order_at(row, dr.select(port > 0, port - 1, 0)), reached > target
 
 
+def _drawn_at_a_corner(lookup: Lookup, row: Any, sample: Float) -> tuple[Any, Mask, Mask]:
+    """Draw a corner of a cell by its part of the sum, then an order by the chances at that node.
+
+    Interpolation mixes the corners, so that both draws have the interpolated chances; and the
+    orders of a node lie side by side in memory.
+    """
+    target, mirrored = sample * lookup.total(row), mi.Mask(False)
+    if lookup.coated:  # the face's mirror direction comes first
+        mirrored = target < row.face * RAISED
+        target = (target - row.face * RAISED) * dr.rcp(dr.maximum(row.entering, _MIN_DIVISOR))
+    node, rest, found, before = mi.UInt32(0), mi.Float(0.0), mi.Mask(False), mi.Float(0.0)
+    corners = zip(lookup.nodes(row), row.weights, lookup.totals(row), strict=True)
+    for corner, weight, total in corners:
+        raised = weight * RAISED
+        after = dr.fma(raised, total, before)
+        here = (target >= before) & (target < after)
+        node = dr.select(here, corner, node)
+        rest = dr.select(here, (target - before) * dr.rcp(dr.maximum(raised, _SMALLEST)), rest)
+        found, before = found | here, after
+    ports = mi.UInt32(lookup.ports(row))
+    records = (ports + 7) >> 3
+    first = lookup.memory.start("chance_starts", row.kind) + (node * ports + row.entered) * records
+
+    def body(n: Index, port: Index, reached: Float) -> tuple[Index, Index, Float]:
+        for i, chance in enumerate(lookup.memory.read("chances", first + n, 8, row.lit)):
+            port = dr.select(reached <= rest, n * 8 + i, port)
+            reached = reached + chance
+        return n + 1, port, reached
+
+    def further(n: Index, port: Index, reached: Float) -> Mask:
+        return (reached <= rest) & (n < records)
+
+    state = mi.UInt32(0), mi.UInt32(0), mi.Float(0.0)
+    _, port, reached = dr.while_loop(state, further, body)
+    order, below = lookup.order_at(row, port)
+    valid = found & (reached > rest)
+    return dr.select(mirrored, 0.0, order), mi.Mask(below) & ~mirrored, valid | mirrored
+
+
 class OrderLobe:
-    """Lobe of an order (m_x, m_y) under the coherence window, in units of orders.
+    """Lobe of an order under the coherence window, in units of orders.
+
+    An order is a whole number; on a crossed grating a vector of two.
 
     Attributes
     ----------
     sigma : standard deviation σ of the amplitude window, µm.
     periods : along x and y, µm, one number for both of grooves; period : the longer one.
-    crossed : whether orders leave along y, too.
+    crossed : whether orders are vectors.
     lookup : of the table.
     """
 
@@ -154,34 +201,49 @@ class OrderLobe:
 
     def position(self, uv: Vector2f, wavelength: Float) -> Vector2f:
         """Return the tangential part of ωi + ωo in units of orders."""
-        d_x, d_y = self.periods
-        return mi.Vector2f(uv.x * d_x, uv.y * d_y) * (1e3 * dr.rcp(wavelength))
+        scale, (d_x, d_y) = 1e3 * dr.rcp(wavelength), self.periods
+        if not self.crossed:
+            return uv * (d_x * scale)
+        return mi.Vector2f(uv.x * d_x, uv.y * d_y) * scale
 
-    def orders(self, position: Vector2f) -> list[Vector2f]:
+    def orders(self, position: Vector2f) -> list[Any]:
         """Return the orders whose lobes reach a position."""
         across = nearest(position.x, self._overlaps[0])
-        along = nearest(position.y, self._overlaps[1]) if self.crossed else [mi.Float(0.0)]
+        if not self.crossed:
+            return across
+        along = nearest(position.y, self._overlaps[1])
         return [mi.Vector2f(m, n) for m in across for n in along]
 
-    def lobe(self, position: Vector2f, order: Vector2f) -> Float:
+    def lobe(self, position: Vector2f, order: Any) -> Float:
         """Return exp(−σ²|q − q_m|²), of a position in units of orders."""
+        if not self.crossed:
+            return order_lobe(position.x - order, position.y, self._sharpness)
         d_x, d_y = self.periods
         along = (position.y - order.y) * (d_x / d_y)
         return order_lobe(position.x - order.x, along, self._sharpness)
 
-    def visible(self, order: Vector2f, pair: Pair, wavelength: Float) -> Float:
+    def visible(self, order: Any, pair: Pair, wavelength: Float) -> Float:
         """Return C(X_i) C(X_o) of order 0, 1 of others."""
-        zeroth = (order.x == 0.0) & (order.y == 0.0)
+        zeroth = (order.x == 0.0) & (order.y == 0.0) if self.crossed else order == 0.0
         return dr.select(zeroth, pair.visible(self.sigma, wavenumber_of(wavelength)), 1.0)
+
+    def mirrored(self) -> Any:
+        """Return order 0."""
+        return mi.Vector2f(0.0, 0.0) if self.crossed else mi.Float(0.0)
+
+    def centre(self, order: Any, wavelength: Float) -> Vector2f:
+        """Return the tangential part of ωi + ωo at an order's centre."""
+        d_x, d_y = self.periods
+        if not self.crossed:
+            return mi.Vector2f(order * wavelength * (1e-3 / d_x), 0.0)
+        return mi.Vector2f(order[0] / d_x, order[1] / d_y) * (1e-3 * wavelength)
 
     def drawn(self, row: Any, wavelength: Float, sample1: Float, sample2: Vector2f) -> Draw:
         """Draw an order of a row, and a direction in its lobe."""
         order, below, valid = draw(self.lookup, row, sample1)
         wide = wavelength * (1e-3 / (2.0 * math.pi * math.sqrt(2.0) * self.sigma))
         spread = mi.warp.square_to_std_normal(minimum(sample2, BELOW_ONE)) * wide
-        m_x, m_y = order
-        centre = mi.Vector2f(m_x / self.periods[0], m_y / self.periods[1]) * (1e-3 * wavelength)
-        return Draw(centre + mi.Vector2f(spread), below, valid)
+        return Draw(self.centre(order, wavelength) + mi.Vector2f(spread), below, valid)
 
 
 def wavenumber_of(wavelength: Float) -> Float:

@@ -46,7 +46,7 @@ class PolarisedLobes(SpectralLobes):
                 if self.lookup.coated:
                     within = self.lookup.repeated(light.row, order, active & light.row.lit)
                     share = minimum(elements[0] * dr.rcp(maximum(within, _MIN_DIVISOR)), 1.0)
-                    face = dr.select(order.x == 0.0, light.row.face, 0.0)
+                    face = dr.select(order == 0.0, light.row.face, 0.0)
                 power = maximum(efficiency - face, 0.0) * lobe * share
                 faces[n] = dr.fma(face, lobe, faces[n])
                 left[n] -= power
