@@ -76,8 +76,9 @@ def sums_of_surfaces(names: Sequence[str] = tuple(SURFACES)) -> Iterator[Sums]:
 
 def sums_of_recipes(recipes: Sequence[Path] = tuple(PRECOMPUTE)) -> Iterator[Sums]:
     """R + T of recipes with their own coherence widths."""
-    for source in map(TableSource.of, recipes):
-        yield from _sums(source.files[0].stem, source.table(source.settings_for({})))
+    for recipe in recipes:
+        source = TableSource.of(recipe)
+        yield from _sums(recipe.stem, source.table(source.settings_for({})))
 
 
 def _sums(name: str, table: DiffractionTable) -> Iterator[Sums]:
