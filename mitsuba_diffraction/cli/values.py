@@ -16,7 +16,7 @@ _MOST_NUMBERS = 10_000
 def value(expected: str, parse: Callable[[str], Any]) -> Callable[[str], Any]:
     """Return a type of argument.
 
-    expected : what is expected, in words.
+    expected : the expected value, in words.
     parse : function of the text that returns its value. None, and a ValueError, are for others; a
         DiffractionError says itself what does not fit.
     """

@@ -62,7 +62,7 @@ def resolved_path(name: str, parameter: str) -> Path:
     resolver = mi.file_resolver()
     path = Path(str(resolver.resolve(name)))
     if path.exists() or path.is_absolute():
-        return path  # whoever opens it says that it does not exist
+        return path  # its reader says that the file does not exist
     folders = dict.fromkeys(str(Path(str(folder)).resolve()) for folder in resolver)
     looked = ", ".join(repr(folder) for folder in folders)
     raise DiffractionError(

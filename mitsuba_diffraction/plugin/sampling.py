@@ -60,7 +60,7 @@ class Strategies:
 
     Parameters
     ----------
-    units : (bands,) factors of `Strategy`; 0 where there is no power besides order 0.
+    units : (bands,) factors of `Strategy`; 0 where order 0 has all power.
     order_0 : (n,) power of order 0 over κ, even from 0 to `kappa_max`.
     kappa_max : largest κ, in the unit of the κ that are looked up.
     """

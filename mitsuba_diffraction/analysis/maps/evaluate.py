@@ -176,7 +176,7 @@ def _add(
         for n in range(start):
             totals[n] += dr.dot(mi.Spectrum(opaque(padded[:, n])), f)
         here = range(start + first, min(start + first + used, len(totals)))
-        for n in here:  # none where bands are not kept
+        for n in here:  # an empty list where bands are not kept
             totals[n] += f[n - here.start]
         dr.eval(totals[here.start : here.stop], totals[:3])
 

@@ -25,7 +25,7 @@ _ASPECT = re.compile(r"\\Aspect ratio: ([\d.]+):([\d.]+)", re.IGNORECASE)
 _SLOW = re.compile(r"\\Slow Axis Size: ([\d.eE+-]+) (~m|[^\s\\]+)", re.IGNORECASE)
 _ROWS = re.compile(r"\\Number of lines: (\d+)", re.IGNORECASE)
 _LINES = re.compile(r"\\Lines: (\d+)", re.IGNORECASE)
-# A data field of Gwyddion's container with its size in bytes, and what it says of its lengths.
+# A data field of Gwyddion's container with its size in bytes, and its lengths.
 _GWY_FIELD = re.compile(rb"/\d+/data\0oGwyDataField\0(.{4})", re.DOTALL)
 _GWY_LENGTHS = (
     re.compile(rb"xreal\0d(.{8})", re.DOTALL),

@@ -270,7 +270,7 @@ def refined_counts(table: OrderTable, worth: float) -> dict[int, Counts]:
 def _last_terms(values: NDArray[np.float32], sides: int) -> list[float]:
     """Return the last two terms of series along τ, ρ and w, and the light.
 
-    values : (τ, ρ, w, j, q, n) at Chebyshev nodes. Order 0 is no colour, and is left out.
+    values : (τ, ρ, w, j, q, n) at Chebyshev nodes. Order 0 is white, and is left out.
     """
     coloured = values.astype(float)
     if (channels := values.shape[3] // sides) > 1:

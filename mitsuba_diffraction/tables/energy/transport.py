@@ -9,8 +9,8 @@ over the frequencies that are visible, with κ = k w times the height scale and 
 
 - order 0, the mirrored or refracted direction, by quadrature over its lobe, or over all directions
   where the lobe is wide;
-- the few *strong* orders, one by one, and at several nodes across a lobe that the horizon cuts: an
-  order that grazes the horizon (a Rayleigh anomaly) is a spike of the albedo;
+- the few *strong* orders, one by one, at several nodes across a lobe that the horizon or a critical
+  angle cuts: an order that grazes the horizon (a Rayleigh anomaly) is a spike of the albedo;
 - the many *weak* ones as a smooth density, by quadrature over directions.
 """
 
@@ -277,7 +277,7 @@ class Transport:
         """Return the map from weights on a grid to the weak orders' light.
 
         The light is summed at directions of half the grid, about the critical angle, where it has
-        a cusp, and beyond the grid, where it may grow as 1/cosθ; it is linear in between.
+        a cusp, and beyond the grid. The light may grow as 1/cosθ: times cosθ it is linear between.
         """
         half = self._orders.incidence(grid.half, self._k)
         near = math.asin(self._path.critical_sine) + _NEAR_CRITICAL
@@ -371,10 +371,8 @@ class Transport:
 
     def _strong(self, theta: Real, phi: Real, grid: DirectionGrid) -> Callable[[Single], Single]:
         """Return the map from weights on a grid to the light of the strong orders."""
-        parts = [
-            self._strong_part(theta[rows], phi, grid)
-            for rows in _blocks(len(theta), len(phi) * self._orders.strong)
-        ]
+        width = len(phi) * self._orders.strong * len(self._path.signs)
+        parts = [self._strong_part(theta[rows], phi, grid) for rows in _blocks(len(theta), width)]
         return lambda s: np.concatenate([part(s) for part in parts])
 
     def _strong_part(self, theta: Real, phi: Real, grid: DirectionGrid) -> LinearMap:
